@@ -1,0 +1,196 @@
+//! Kinematics of a machine with given deviations: poses, and the rows of every Jacobian in one sweep.
+//!
+//! A [`Chain`] is a machine whose constant part, `M_j exp(dh_j)`, has been multiplied out once. A [`Sweep`] is that chain at one
+//! vector of commands; from it come poses and, by carrying one wrench along the chain, the row of any scalar measurement.
+
+use crate::lie::{Pose, Twist, Vec3, Wrench};
+use crate::machine::{Branch, Drive, JointKind, Machine};
+use crate::scalar::Scalar;
+
+/// A machine with constant deviations, ready to be evaluated. Generic over the scalar: the production code and the autodiff
+/// check run the same functions.
+#[derive(Clone, Debug)]
+pub struct Chain<S> {
+    links: Vec<Link<S>>,
+    workpiece_count: usize,
+}
+
+#[derive(Clone, Debug)]
+struct Link<S> {
+    /// `M_j exp(dh_j)`.
+    previous_from_frame: Pose<S>,
+    joint: Option<(JointKind, Vec3<f64>, Drive)>,
+}
+
+/// A chain at one vector of commands.
+#[derive(Clone, Debug)]
+pub struct Sweep<S> {
+    /// Pose of each dyad's frame in the base, before its joint has moved, machine order.
+    b_from_frame: Vec<Pose<S>>,
+    b_from_w: Pose<S>,
+    b_from_t: Pose<S>,
+    workpiece_count: usize,
+}
+
+impl Chain<f64> {
+    /// The machine as it is declared.
+    pub fn nominal(machine: &Machine) -> Self {
+        Self::new(machine, &vec![Twist::zero(0.0); machine.dyads().len()])
+    }
+}
+
+impl<S: Scalar> Chain<S> {
+    /// The machine with deviations `dh`, one per dyad in machine order, each in its own frame: `M_j exp(dh_j)`, `docs/model.md` (10).
+    ///
+    /// # Panics
+    /// If `deviations` has not one twist per dyad.
+    pub fn new(machine: &Machine, deviations: &[Twist<S>]) -> Self {
+        assert_eq!(deviations.len(), machine.dyads().len(), "one deviation per dyad");
+        let link = |(j, dh): (usize, &Twist<S>)| {
+            let dyad = &machine.dyads()[j];
+            let nominal = dyad.placement.pose().lift(dh.v.0[0]);
+            let joint = dyad.joint.as_ref().map(|joint| {
+                let drive = machine.drive(j).expect("every joint has a drive").clone();
+                (joint.kind, joint.axis, drive)
+            });
+            Link { previous_from_frame: nominal * Pose::exp(*dh), joint }
+        };
+        Chain {
+            links: deviations.iter().enumerate().map(link).collect(),
+            workpiece_count: machine.workpiece_count(),
+        }
+    }
+
+    /// Replaces the whole initial pose of one frame, deviation included.
+    pub fn set_previous_from_frame(&mut self, j: usize, previous_from_frame: Pose<S>) {
+        self.links[j].previous_from_frame = previous_from_frame;
+    }
+
+    /// `M_j exp(dh_j)` of dyad `j`.
+    pub fn previous_from_frame(&self, j: usize) -> Pose<S> {
+        self.links[j].previous_from_frame
+    }
+
+    /// The chain at the commands `q` (m or rad, machine order), `docs/model.md` (9), (10).
+    pub fn sweep(&self, q: &[S]) -> Sweep<S> {
+        let mut sweep = Sweep {
+            b_from_frame: Vec::with_capacity(self.links.len()),
+            b_from_w: self.links[0].previous_from_frame,
+            b_from_t: self.links[0].previous_from_frame,
+            workpiece_count: self.workpiece_count,
+        };
+        self.sweep_into(q, &mut sweep);
+        sweep
+    }
+
+    /// As [`Chain::sweep`], into memory that is used again.
+    pub fn sweep_into(&self, q: &[S], sweep: &mut Sweep<S>) {
+        sweep.b_from_frame.clear();
+        let like = q[0];
+        let mut behind = Pose::identity(like);
+        for (j, link) in self.links.iter().enumerate() {
+            if j == self.workpiece_count {
+                sweep.b_from_w = behind;
+                behind = Pose::identity(like);
+            }
+            let b_from_frame = behind * link.previous_from_frame;
+            sweep.b_from_frame.push(b_from_frame);
+            behind = match &link.joint {
+                None => b_from_frame,
+                Some((kind, axis, drive)) => b_from_frame * joint_pose(*kind, *axis, displacement(drive, q)),
+            };
+        }
+        sweep.b_from_t = behind;
+    }
+
+    /// `w_from_t` at the commands `q`, `docs/model.md` (10).
+    pub fn w_from_t(&self, q: &[S]) -> Pose<S> {
+        self.sweep(q).w_from_t()
+    }
+}
+
+/// `exp(xi q)` of one joint, `docs/model.md` (8).
+#[inline(always)]
+fn joint_pose<S: Scalar>(kind: JointKind, axis: Vec3<f64>, displacement: S) -> Pose<S> {
+    match kind {
+        JointKind::Prismatic => Pose::translation(axis.lift(displacement).times(displacement)),
+        JointKind::Revolute => Pose::turn(axis, displacement),
+    }
+}
+
+/// `s = Σ factor × command`, `docs/model.md` (9).
+#[inline(always)]
+fn displacement<S: Scalar>(drive: &Drive, q: &[S]) -> S {
+    let mut sum = q[0].lift(0.0);
+    for (command, factor) in &drive.terms {
+        sum = sum + q[*command].scale(*factor);
+    }
+    sum
+}
+
+impl<S: Scalar> Sweep<S> {
+    /// Pose of the tool frame in the workpiece frame.
+    #[inline(always)]
+    pub fn w_from_t(&self) -> Pose<S> {
+        self.b_from_w.inverse() * self.b_from_t
+    }
+
+    /// Pose of the workpiece frame in the base.
+    pub fn b_from_w(&self) -> Pose<S> {
+        self.b_from_w
+    }
+
+    /// Pose of the tool frame in the base.
+    pub fn b_from_t(&self) -> Pose<S> {
+        self.b_from_t
+    }
+
+    /// Pose of dyad `j`'s frame in the base, before its joint has moved.
+    pub fn b_from_frame(&self, j: usize) -> Pose<S> {
+        self.b_from_frame[j]
+    }
+
+    /// `s_j` of dyad `j`.
+    #[inline(always)]
+    fn sign(&self, j: usize) -> f64 {
+        if j < self.workpiece_count { Branch::Workpiece.sign() } else { Branch::Tool.sign() }
+    }
+
+    /// The row of a scalar measurement over all deviations, six numbers per dyad in machine order, `docs/model.md` (14).
+    ///
+    /// `y_w`: what the measurement does with a small twist of the tool seen from the workpiece, in frame `w` about its origin.
+    /// Each block is that wrench seen from the dyad's own frame, with the sign of its branch; it is the derivative by an
+    /// increment `exp(δ)` behind `exp(dh)`. See [`deviation_jacobian`] for the derivative by `dh` itself.
+    #[inline]
+    pub fn error_row(&self, y_w: Wrench<S>, row: &mut [S]) {
+        let y_b = self.b_from_w.inverse().carry_wrench(y_w);
+        for (j, b_from_frame) in self.b_from_frame.iter().enumerate() {
+            let block = b_from_frame.carry_wrench(y_b).to_array();
+            let sign = self.sign(j);
+            for (k, value) in block.into_iter().enumerate() {
+                row[6 * j + k] = value.scale(sign);
+            }
+        }
+    }
+
+    /// The row of a scalar measurement over the commands, `docs/model.md` (13).
+    pub fn command_row(&self, machine: &Machine, y_w: Wrench<S>, row: &mut [S]) {
+        let y_b = self.b_from_w.inverse().carry_wrench(y_w);
+        row.iter_mut().for_each(|value| *value = value.lift(0.0));
+        for (j, joint) in machine.joints() {
+            let xi = joint.twist().lift(y_w.f.0[0]);
+            let by_displacement = self.b_from_frame[j].carry_wrench(y_b).dot(xi).scale(self.sign(j));
+            for (command, factor) in &machine.drive(j).expect("every joint has a drive").terms {
+                row[*command] = row[*command] + by_displacement.scale(*factor);
+            }
+        }
+    }
+}
+
+/// Derivative of an increment behind `exp(dh)` by `dh`: the right Jacobian, `docs/model.md` (12).
+///
+/// Six numbers of an error row times this matrix are the derivative by the deviation's own coordinates. It is constant over a
+/// recording, so that rows stay rows of increments and only sums over them are turned.
+pub fn deviation_jacobian<S: Scalar>(dh: Twist<S>) -> [[S; 6]; 6] {
+    dh.right_jacobian().to_array()
+}

@@ -1,0 +1,78 @@
+//! A 3 × 3 matrix, rows first, for rotations and the small matrices around them.
+
+use std::ops::{Add, Mul};
+
+use super::Vec3;
+use crate::Scalar;
+
+/// Three rows of three components.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mat3<S>(pub [[S; 3]; 3]);
+
+impl<S: Scalar> Mat3<S> {
+    /// The unit matrix, of the same kind of scalar as `like`.
+    #[inline(always)]
+    pub fn identity(like: S) -> Self {
+        let (o, l) = (like.lift(0.0), like.lift(1.0));
+        Mat3([[l, o, o], [o, l, o], [o, o, l]])
+    }
+
+    /// `hat(w)`: the matrix with `hat(w) x = w × x`, `docs/model.md` (2).
+    #[inline(always)]
+    pub fn hat(w: Vec3<S>) -> Self {
+        let ([x, y, z], o) = (w.0, w.0[0].lift(0.0));
+        Mat3([[o, -z, y], [z, o, -x], [-y, x, o]])
+    }
+
+    /// The transposed matrix; for a rotation its inverse.
+    #[inline(always)]
+    pub fn transpose(self) -> Self {
+        let [[a, b, c], [d, e, f], [g, h, i]] = self.0;
+        Mat3([[a, d, g], [b, e, h], [c, f, i]])
+    }
+
+    /// Every element times `factor`.
+    #[inline(always)]
+    pub fn times(self, factor: S) -> Self {
+        Mat3(self.0.map(|row| row.map(|c| c * factor)))
+    }
+
+    /// Column `j`.
+    #[inline(always)]
+    pub fn column(self, j: usize) -> Vec3<S> {
+        Vec3([self.0[0][j], self.0[1][j], self.0[2][j]])
+    }
+}
+
+impl Mat3<f64> {
+    /// The same matrix as constants of the kind of `like`.
+    #[inline(always)]
+    pub fn lift<S: Scalar>(self, like: S) -> Mat3<S> {
+        Mat3(self.0.map(|row| row.map(|c| like.lift(c))))
+    }
+}
+
+impl<S: Scalar> Mul for Mat3<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        let columns = [o.column(0), o.column(1), o.column(2)];
+        Mat3(self.0.map(|row| columns.map(|c| Vec3(row).dot(c))))
+    }
+}
+
+impl<S: Scalar> Mul<Vec3<S>> for Mat3<S> {
+    type Output = Vec3<S>;
+    #[inline(always)]
+    fn mul(self, x: Vec3<S>) -> Vec3<S> {
+        Vec3(self.0.map(|row| Vec3(row).dot(x)))
+    }
+}
+
+impl<S: Scalar> Add for Mat3<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Mat3(std::array::from_fn(|i| (Vec3(self.0[i]) + Vec3(o.0[i])).0))
+    }
+}

@@ -1,0 +1,92 @@
+//! A small vector of three scalars, written by hand so that duals and lanes run it.
+
+use std::ops::{Add, Neg, Sub};
+
+use crate::Scalar;
+
+/// Three components; what they mean (m, rad, 1) is said where it is used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vec3<S>(pub [S; 3]);
+
+impl<S: Scalar> Vec3<S> {
+    /// From three components.
+    #[inline(always)]
+    pub fn new(x: S, y: S, z: S) -> Self {
+        Vec3([x, y, z])
+    }
+
+    /// The zero vector, of the same kind of scalar as `like`.
+    #[inline(always)]
+    pub fn zero(like: S) -> Self {
+        Vec3([like.lift(0.0); 3])
+    }
+
+    /// Inner product.
+    #[inline(always)]
+    pub fn dot(self, other: Self) -> S {
+        self.0[0] * other.0[0] + self.0[1] * other.0[1] + self.0[2] * other.0[2]
+    }
+
+    /// Vector product `self × other`.
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        let ([a, b, c], [x, y, z]) = (self.0, other.0);
+        Vec3([b * z - c * y, c * x - a * z, a * y - b * x])
+    }
+
+    /// Every component times `factor`.
+    #[inline(always)]
+    pub fn times(self, factor: S) -> Self {
+        Vec3(self.0.map(|c| c * factor))
+    }
+
+    /// Euclidean length; its derivative exists only away from zero.
+    #[inline(always)]
+    pub fn norm(self) -> S {
+        self.dot(self).sqrt()
+    }
+}
+
+impl Vec3<f64> {
+    /// The same vector as constants of the kind of `like`.
+    #[inline(always)]
+    pub fn lift<S: Scalar>(self, like: S) -> Vec3<S> {
+        Vec3(self.0.map(|c| like.lift(c)))
+    }
+}
+
+impl<S: Scalar> Add for Vec3<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Vec3([self.0[0] + o.0[0], self.0[1] + o.0[1], self.0[2] + o.0[2]])
+    }
+}
+
+impl<S: Scalar> Sub for Vec3<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Vec3([self.0[0] - o.0[0], self.0[1] - o.0[1], self.0[2] - o.0[2]])
+    }
+}
+
+impl<S: Scalar> Neg for Vec3<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Vec3(self.0.map(|c| -c))
+    }
+}
+
+impl From<nalgebra::Vector3<f64>> for Vec3<f64> {
+    fn from(v: nalgebra::Vector3<f64>) -> Self {
+        Vec3([v.x, v.y, v.z])
+    }
+}
+
+impl From<Vec3<f64>> for nalgebra::Vector3<f64> {
+    fn from(v: Vec3<f64>) -> Self {
+        nalgebra::Vector3::new(v.0[0], v.0[1], v.0[2])
+    }
+}

@@ -1,0 +1,188 @@
+//! What can be wrong with a machine, and the mend for each.
+
+/// A fault in a machine declaration.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MachineFault {
+    /// A branch without a frame.
+    #[error("list `{branch}` is empty")]
+    EmptyBranch {
+        /// `workpiece` or `tool`.
+        branch: String,
+    },
+    /// The last frame of a list has the wrong name.
+    #[error("list `{branch}` ends with frame \"{found}\", not with \"{expected}\"")]
+    LastFrame {
+        /// `workpiece` or `tool`.
+        branch: String,
+        /// `w` or `t`.
+        expected: String,
+        /// The name found.
+        found: String,
+    },
+    /// The last frame carries a joint.
+    #[error("last frame \"{frame}\" has a joint")]
+    JointOnLastFrame {
+        /// Its name.
+        frame: String,
+    },
+    /// A name that stands twice.
+    #[error("{what} \"{name}\" is named twice")]
+    NameTwice {
+        /// `frame` or `joint`.
+        what: String,
+        /// The name.
+        name: String,
+    },
+    /// A name that recordings could not use.
+    #[error("{what} name \"{name}\" cannot be used")]
+    BadName {
+        /// `machine`, `frame` or `joint`.
+        what: String,
+        /// The name.
+        name: String,
+    },
+    /// A vector of length zero.
+    #[error("{what} has length 0")]
+    ZeroVector {
+        /// Whose.
+        what: String,
+    },
+    /// An axis that is not a unit vector.
+    #[error("axis of joint \"{joint}\" has length {length:.6}, expected 1")]
+    AxisLength {
+        /// Name of the joint.
+        joint: String,
+        /// Its length.
+        length: f64,
+        /// The unit vector along it.
+        unit: [f64; 3],
+    },
+    /// An axis word that names none.
+    #[error("axis \"{word}\" is not known")]
+    AxisWord {
+        /// As written.
+        word: String,
+    },
+    /// NaN or infinite, or too large to be meant.
+    #[error("{what} is {value}, not a usable number")]
+    NotFinite {
+        /// Of what.
+        what: String,
+        /// The value.
+        value: f64,
+    },
+    /// Lower limit not below the upper one.
+    #[error("travel of joint \"{joint}\" runs from {from} to {to}")]
+    TravelReversed {
+        /// Name of the joint.
+        joint: String,
+        /// Lower limit in the file's unit.
+        from: f64,
+        /// Upper limit in the file's unit.
+        to: f64,
+    },
+    /// A tolerance that is not positive.
+    #[error("tolerance of {what} is {value}")]
+    Tolerance {
+        /// `translation` or `rotation`.
+        what: String,
+        /// In SI.
+        value: f64,
+    },
+    /// A mass that is negative.
+    #[error("mass of frame \"{frame}\" is {value} kg")]
+    Mass {
+        /// Name of the frame.
+        frame: String,
+        /// kg.
+        value: f64,
+    },
+    /// A joint follows a name that is no joint, or one that itself has no command.
+    #[error("joint \"{joint}\" follows \"{leader}\", which has no command of its own")]
+    Leader {
+        /// The follower.
+        joint: String,
+        /// The unknown leader.
+        leader: String,
+        /// Joints that could lead.
+        known: String,
+    },
+    /// `at`/`rotation` and `moves` both given.
+    #[error("frame \"{frame}\" has `moves` beside `at` or `rotation`")]
+    TwoPlacements {
+        /// Name of the frame.
+        frame: String,
+    },
+    /// A unit that is not one, or of the wrong kind.
+    #[error("unit `{unit}` is no unit of {what}")]
+    Unit {
+        /// As written.
+        unit: String,
+        /// `length` or `angle`.
+        what: String,
+        /// Those that are.
+        known: String,
+    },
+    /// NC sign other than 1 and -1, or an address that is not letters and digits.
+    #[error("NC word of joint \"{joint}\" has address \"{address}\" and sign {sign}")]
+    NcWord {
+        /// Name of the joint.
+        joint: String,
+        /// As written.
+        address: String,
+        /// As written.
+        sign: i8,
+    },
+    /// A machine without any joint.
+    #[error("no dyad has a joint")]
+    NoJoint,
+    /// A frame named in a calibration that the machine does not have.
+    #[error("frame \"{frame}\" is not one of the machine's")]
+    UnknownFrame {
+        /// As written.
+        frame: String,
+        /// The machine's frames.
+        known: String,
+    },
+}
+
+impl MachineFault {
+    /// How to mend it.
+    pub fn mend(&self) -> String {
+        use MachineFault::*;
+        match self {
+            EmptyBranch { branch } => {
+                let last = if branch == "tool" { "t" } else { "w" };
+                format!("write at least the last frame: {branch}: [(frame: \"{last}\")]")
+            }
+            LastFrame { branch, expected, .. } => {
+                format!("end the list `{branch}` with (frame: \"{expected}\", at: (x, y, z))")
+            }
+            JointOnLastFrame { frame } => {
+                format!("give the joint a frame of its own before \"{frame}\"; nothing comes after \"{frame}\" that it could move")
+            }
+            NameTwice { what, .. } => format!("give every {what} a name of its own"),
+            BadName { .. } => {
+                "use letters, digits, `_` and `-`, starting with a letter; `t` is the tool frame and the time column, `w` the workpiece frame".into()
+            }
+            ZeroVector { .. } => "write a unit vector".into(),
+            AxisLength { unit: [x, y, z], .. } => {
+                format!("write one of \"x\" \"-x\" \"y\" \"-y\" \"z\" \"-z\", or the unit vector ({x}, {y}, {z})")
+            }
+            AxisWord { .. } => {
+                "write one of \"x\" \"-x\" \"y\" \"-y\" \"z\" \"-z\", or a unit vector (0, 0.6, 0.8)".into()
+            }
+            NotFinite { .. } => "write a finite number below 1e9".into(),
+            TravelReversed { .. } => "write the lower limit first: travel: (lower, upper)".into(),
+            Tolerance { .. } => "write a positive number: how far off you expect such a value to be".into(),
+            Mass { .. } => "write a mass of zero or more, in kg".into(),
+            Leader { known, .. } => format!("joints that can lead: {known}"),
+            TwoPlacements { .. } => "keep one of the two ways of saying where the frame is".into(),
+            Unit { known, .. } => format!("write one of: {known}"),
+            NcWord { .. } => "write address: letters and digits such as \"B\" or \"C1\", sign: 1 or -1".into(),
+            NoJoint => "a machine needs a joint: (frame: \"x\", joint: Prismatic(axis: \"x\"))".into(),
+            UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
+        }
+    }
+}

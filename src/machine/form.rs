@@ -1,0 +1,175 @@
+//! The RON form of a machine, in the file's own units.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+use crate::calibration::CalibrationForm;
+
+/// Three numbers as RON writes them, `(1, 2, 3)`.
+pub(crate) type Triple = (f64, f64, f64);
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "Machine", deny_unknown_fields)]
+pub(crate) struct MachineForm {
+    pub name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub about: Option<String>,
+    pub units: UnitsForm,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity: Option<Triple>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<ToleranceForm>,
+    pub workpiece: Vec<DyadForm>,
+    pub tool: Vec<DyadForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationForm>,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "units", deny_unknown_fields)]
+pub(crate) struct UnitsForm {
+    pub length: LengthUnit,
+    pub angle: AngleUnit,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[allow(non_camel_case_types)]
+pub(crate) enum LengthUnit {
+    m,
+    mm,
+    um,
+    nm,
+    r#in,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[allow(non_camel_case_types)]
+pub(crate) enum AngleUnit {
+    rad,
+    mrad,
+    urad,
+    deg,
+    arcsec,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[serde(rename = "tolerance", deny_unknown_fields)]
+pub(crate) struct ToleranceForm {
+    pub translation: f64,
+    pub rotation: f64,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "dyad", deny_unknown_fields)]
+pub(crate) struct DyadForm {
+    pub frame: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at: Option<Triple>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<Triple>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moves: Option<Vec<MoveForm>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<JointForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre_of_mass: Option<Triple>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<ToleranceForm>,
+}
+
+/// One elementary move; a list of them, from left to right, says any initial pose: DH, modified DH, roll-pitch-yaw.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+pub(crate) enum MoveForm {
+    Tx(f64),
+    Ty(f64),
+    Tz(f64),
+    Rx(f64),
+    Ry(f64),
+    Rz(f64),
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub(crate) enum JointForm {
+    Prismatic(JointBody),
+    Revolute(JointBody),
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "joint", deny_unknown_fields)]
+pub(crate) struct JointBody {
+    pub axis: AxisForm,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub travel: Option<(f64, f64)>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub follows: Option<BTreeMap<String, f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nc: Option<NcForm>,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "nc", deny_unknown_fields)]
+pub(crate) struct NcForm {
+    pub address: String,
+    #[serde(default = "plus")]
+    pub sign: i8,
+}
+
+fn plus() -> i8 {
+    1
+}
+
+/// A deviation twist (v; w) in the file's units.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[serde(rename = "deviation", deny_unknown_fields)]
+pub(crate) struct TwistForm {
+    pub v: Triple,
+    pub w: Triple,
+}
+
+/// An axis: a word in quotes or a vector.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum AxisForm {
+    Word(String),
+    Vector(Triple),
+}
+
+impl<'de> Deserialize<'de> for AxisForm {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Visitor;
+        impl<'de> de::Visitor<'de> for Visitor {
+            type Value = AxisForm;
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("an axis: \"x\" or \"-z\" in quotes, or a unit vector (0, 0.6, 0.8)")
+            }
+            fn visit_str<E: de::Error>(self, word: &str) -> Result<AxisForm, E> {
+                Ok(AxisForm::Word(word.to_string()))
+            }
+            fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<AxisForm, A::Error> {
+                let mut next = |index| {
+                    seq.next_element::<f64>()?.ok_or_else(|| de::Error::invalid_length(index, &"three numbers"))
+                };
+                let vector = (next(0)?, next(1)?, next(2)?);
+                if seq.next_element::<f64>()?.is_some() {
+                    return Err(de::Error::invalid_length(4, &"three numbers"));
+                }
+                Ok(AxisForm::Vector(vector))
+            }
+        }
+        deserializer.deserialize_any(Visitor)
+    }
+}
+
+impl Serialize for AxisForm {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            AxisForm::Word(word) => serializer.serialize_str(word),
+            AxisForm::Vector(vector) => vector.serialize(serializer),
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! From text to a checked machine.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::form::{AxisForm, DyadForm, JointBody, JointForm, MachineForm, MoveForm, ToleranceForm, Triple};
+use super::{
+    Branch, Drive, Dyad, FileUnits, Joint, JointKind, Machine, MachineFault, MassPoint, NcWord, Placement,
+    Tolerance,
+};
+use crate::document::Document;
+use crate::error::{Error, Result};
+use crate::lie::{Pose, Vec3};
+use crate::units::Unit;
+
+/// A value and the path at which it was found wrong.
+type Checked<T> = std::result::Result<T, (String, MachineFault)>;
+
+/// Nothing on a machine is larger than this, in m or rad.
+const LARGEST: f64 = 1e9;
+
+impl Machine {
+    /// Reads a machine file.
+    ///
+    /// # Errors
+    /// [`Error::File`], [`Error::Ron`] or [`Error::Machine`], the last two with line and column.
+    pub fn open(path: impl AsRef<Path>) -> Result<Machine> {
+        let document = Document::open(path)?;
+        let form = document.read()?;
+        Machine::from_form(&form).map_err(|e| at_path(&document, e))
+    }
+
+    /// Reads a machine from a text; `file` is only the name that messages use.
+    ///
+    /// # Errors
+    /// As [`Machine::open`].
+    pub fn parse(file: impl AsRef<Path>, text: &str) -> Result<Machine> {
+        let document = Document::new(file, text.to_string())?;
+        let form = document.read()?;
+        Machine::from_form(&form).map_err(|e| at_path(&document, e))
+    }
+
+    pub(crate) fn from_form(form: &MachineForm) -> Checked<Machine> {
+        let units = FileUnits {
+            length: Unit::named(&unit_word(&form.units.length)).expect("every length word is a unit"),
+            angle: Unit::named(&unit_word(&form.units.angle)).expect("every angle word is a unit"),
+        };
+        let branch = |branch: Branch, forms: &[DyadForm]| -> Checked<Vec<Dyad>> {
+            let path = |i| format!("{}[{i}]", branch.field());
+            forms.iter().enumerate().map(|(i, f)| dyad(f, units, &path(i))).collect()
+        };
+        let mut machine = Machine::new(
+            form.name.clone(),
+            units,
+            branch(Branch::Workpiece, &form.workpiece)?,
+            branch(Branch::Tool, &form.tool)?,
+        )?
+        .with_about(form.about.clone());
+        if let Some(gravity) = form.gravity {
+            finite("gravity", gravity, "direction of gravity")?;
+            machine = machine.with_gravity(vec3(gravity))?;
+        }
+        if let Some(form) = form.tolerance {
+            machine = machine.with_tolerance(tolerance(form, units))?;
+        }
+        Ok(machine)
+    }
+
+    /// Checks everything that concerns more than one value, and works out commands and drives.
+    pub(super) fn check(&mut self) -> Checked<()> {
+        usable_name("name", "machine", &self.name)?;
+        for branch in [Branch::Workpiece, Branch::Tool] {
+            self.check_branch(branch)?;
+        }
+        let mut frames = BTreeSet::new();
+        let mut joints = BTreeSet::new();
+        for (j, dyad) in self.dyads.iter().enumerate() {
+            let path = self.path_of(j);
+            if !frames.insert(dyad.frame.as_str()) {
+                let name = dyad.frame.clone();
+                return Err((format!("{path}.frame"), MachineFault::NameTwice { what: "frame".into(), name }));
+            }
+            usable_name(&format!("{path}.frame"), "frame", &dyad.frame)?;
+            check_dyad(dyad, &path, self.units)?;
+            let Some(joint) = &dyad.joint else { continue };
+            if !joints.insert(joint.name.as_str()) {
+                let name = joint.name.clone();
+                return Err((format!("{path}.joint.name"), MachineFault::NameTwice { what: "joint".into(), name }));
+            }
+            if joint.name == "t" || joint.name == "w" {
+                let name = joint.name.clone();
+                return Err((format!("{path}.joint.name"), MachineFault::BadName { what: "joint".into(), name }));
+            }
+        }
+        if joints.is_empty() {
+            return Err(("tool".into(), MachineFault::NoJoint));
+        }
+        self.work_out_drives()
+    }
+
+    fn check_branch(&self, branch: Branch) -> Checked<()> {
+        let (dyads, expected) = match branch {
+            Branch::Workpiece => (&self.dyads[..self.workpiece_count], "w"),
+            Branch::Tool => (&self.dyads[self.workpiece_count..], "t"),
+        };
+        let field = branch.field();
+        let Some(last) = dyads.last() else {
+            return Err((field.into(), MachineFault::EmptyBranch { branch: field.into() }));
+        };
+        let path = format!("{field}[{}]", dyads.len() - 1);
+        if last.frame != expected {
+            let fault = MachineFault::LastFrame {
+                branch: field.into(),
+                expected: expected.into(),
+                found: last.frame.clone(),
+            };
+            return Err((format!("{path}.frame"), fault));
+        }
+        if last.joint.is_some() {
+            let fault = MachineFault::JointOnLastFrame { frame: last.frame.clone() };
+            return Err((format!("{path}.joint"), fault));
+        }
+        Ok(())
+    }
+
+    fn work_out_drives(&mut self) -> Checked<()> {
+        let commanded = |joint: &Joint| joint.follows.as_ref().is_none_or(|f| f.contains_key(&joint.name));
+        let commands: Vec<String> =
+            self.joints().filter(|(_, j)| commanded(j)).map(|(_, j)| j.name.clone()).collect();
+        let mut drives = vec![None; self.dyads.len()];
+        for (j, joint) in self.joints() {
+            let own = [(joint.name.clone(), 1.0)].into();
+            let mut terms = Vec::new();
+            for (leader, factor) in joint.follows.as_ref().unwrap_or(&own) {
+                let path = format!("{}.joint.follows.{leader}", self.path_of(j));
+                if !(factor.is_finite() && factor.abs() < LARGEST) {
+                    return Err((path, MachineFault::NotFinite { what: "a factor of `follows`".into(), value: *factor }));
+                }
+                let Some(index) = commands.iter().position(|c| c == leader) else {
+                    let fault = MachineFault::Leader {
+                        joint: joint.name.clone(),
+                        leader: leader.clone(),
+                        known: commands.join(", "),
+                    };
+                    return Err((path, fault));
+                };
+                terms.push((index, *factor));
+            }
+            terms.sort_by_key(|(index, _)| *index);
+            drives[j] = Some(Drive { terms });
+        }
+        if commands.is_empty() {
+            return Err(("tool".into(), MachineFault::NoJoint));
+        }
+        (self.commands, self.drives) = (commands, drives);
+        Ok(())
+    }
+
+    /// Path of dyad `j` in a machine file.
+    pub(super) fn path_of(&self, j: usize) -> String {
+        match self.branch(j) {
+            Branch::Workpiece => format!("workpiece[{j}]"),
+            Branch::Tool => format!("tool[{}]", j - self.workpiece_count),
+        }
+    }
+}
+
+/// A fault with its path becomes an error with its place.
+pub(crate) fn at_path(document: &Document, (path, fault): (String, MachineFault)) -> Error {
+    Error::Machine { place: document.place_of(&path), fault }
+}
+
+fn unit_word(word: &impl serde::Serialize) -> String {
+    ron::to_string(word).unwrap_or_default().trim_start_matches("r#").to_string()
+}
+
+fn vec3((x, y, z): Triple) -> Vec3<f64> {
+    Vec3([x, y, z])
+}
+
+fn finite(path: &str, (x, y, z): Triple, what: &str) -> Checked<()> {
+    for (i, value) in [x, y, z].into_iter().enumerate() {
+        if !(value.is_finite() && value.abs() < LARGEST) {
+            return Err((format!("{path}[{i}]"), MachineFault::NotFinite { what: what.into(), value }));
+        }
+    }
+    Ok(())
+}
+
+fn number(path: String, value: f64, what: &str) -> Checked<f64> {
+    if value.is_finite() && value.abs() < LARGEST {
+        return Ok(value);
+    }
+    Err((path, MachineFault::NotFinite { what: what.into(), value }))
+}
+
+fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+    if name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.len() <= 64 && name.chars().all(fits) {
+        return Ok(());
+    }
+    Err((path.into(), MachineFault::BadName { what: what.into(), name: name.into() }))
+}
+
+fn tolerance(form: ToleranceForm, units: FileUnits) -> Tolerance {
+    Tolerance {
+        translation: units.length.to_si(form.translation),
+        rotation: units.angle.to_si(form.rotation),
+    }
+}
+
+fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
+    let mass = match (form.mass, form.centre_of_mass) {
+        (None, None) => None,
+        (mass, centre) => {
+            let centre = centre.unwrap_or_default();
+            finite(&format!("{path}.centre_of_mass"), centre, "centre of mass")?;
+            let centre = Vec3(vec3(centre).0.map(|c| units.length.to_si(c)));
+            Some(MassPoint { mass: mass.unwrap_or(0.0), centre })
+        }
+    };
+    Ok(Dyad {
+        frame: form.frame.clone(),
+        placement: placement(form, units, path)?,
+        joint: form.joint.as_ref().map(|j| joint(j, &form.frame, units, path)).transpose()?,
+        mass,
+        tolerance: form.tolerance.map(|t| tolerance(t, units)),
+    })
+}
+
+fn placement(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Placement> {
+    let Some(moves) = &form.moves else {
+        let (at, rotation) = (form.at.unwrap_or_default(), form.rotation.unwrap_or_default());
+        finite(&format!("{path}.at"), at, "a coordinate of `at`")?;
+        finite(&format!("{path}.rotation"), rotation, "a component of `rotation`")?;
+        return Ok(Placement {
+            at: Vec3(vec3(at).0.map(|c| units.length.to_si(c))),
+            rotation: Vec3(vec3(rotation).0.map(|c| units.angle.to_si(c))),
+        });
+    };
+    if form.at.is_some() || form.rotation.is_some() {
+        return Err((format!("{path}.moves"), MachineFault::TwoPlacements { frame: form.frame.clone() }));
+    }
+    let mut pose = Pose::identity(0.0);
+    for (i, step) in moves.iter().enumerate() {
+        let (along, value, turns) = match *step {
+            MoveForm::Tx(value) => (0, value, false),
+            MoveForm::Ty(value) => (1, value, false),
+            MoveForm::Tz(value) => (2, value, false),
+            MoveForm::Rx(value) => (0, value, true),
+            MoveForm::Ry(value) => (1, value, true),
+            MoveForm::Rz(value) => (2, value, true),
+        };
+        number(format!("{path}.moves[{i}]"), value, "a move")?;
+        let axis = Vec3(std::array::from_fn(|k| if k == along { 1.0 } else { 0.0 }));
+        pose = pose
+            * if turns {
+                Pose::turn(axis, units.angle.to_si(value))
+            } else {
+                Pose::translation(axis.times(units.length.to_si(value)))
+            };
+    }
+    Ok(pose.into())
+}
+
+fn joint(form: &JointForm, frame: &str, units: FileUnits, path: &str) -> Checked<Joint> {
+    let (kind, body, unit) = match form {
+        JointForm::Prismatic(body) => (JointKind::Prismatic, body, units.length),
+        JointForm::Revolute(body) => (JointKind::Revolute, body, units.angle),
+    };
+    let name = body.name.clone().unwrap_or_else(|| frame.to_string());
+    let axis = axis(body, &name, &format!("{path}.joint.axis"))?;
+    if let Some((from, to)) = body.travel {
+        number(format!("{path}.joint.travel[0]"), from, "a limit of `travel`")?;
+        number(format!("{path}.joint.travel[1]"), to, "a limit of `travel`")?;
+        if from >= to {
+            return Err((format!("{path}.joint.travel"), MachineFault::TravelReversed { joint: name, from, to }));
+        }
+    }
+    let nc = body.nc.as_ref().map(|nc| NcWord { address: nc.address.clone(), sign: nc.sign });
+    Ok(Joint {
+        name,
+        kind,
+        axis,
+        travel: body.travel.map(|(from, to)| (unit.to_si(from), unit.to_si(to))),
+        follows: body.follows.clone(),
+        nc,
+    })
+}
+
+fn axis(body: &JointBody, name: &str, path: &str) -> Checked<Vec3<f64>> {
+    let vector = match &body.axis {
+        AxisForm::Word(word) => {
+            let (sign, letter) = match word.strip_prefix('-') {
+                Some(rest) => (-1.0, rest),
+                None => (1.0, word.strip_prefix('+').unwrap_or(word)),
+            };
+            let along = match letter {
+                "x" | "X" => 0,
+                "y" | "Y" => 1,
+                "z" | "Z" => 2,
+                _ => return Err((path.into(), MachineFault::AxisWord { word: word.clone() })),
+            };
+            return Ok(Vec3(std::array::from_fn(|k| if k == along { sign } else { 0.0 })));
+        }
+        AxisForm::Vector(vector) => *vector,
+    };
+    finite(path, vector, "a component of `axis`")?;
+    unit_axis(vec3(vector), name, path)
+}
+
+/// Rounding in the last digits is mended; anything else is a mistake.
+fn unit_axis(axis: Vec3<f64>, name: &str, path: &str) -> Checked<Vec3<f64>> {
+    let length = axis.norm();
+    if length < 1e-12 {
+        let what = format!("axis of joint \"{name}\"");
+        return Err((path.into(), MachineFault::ZeroVector { what }));
+    }
+    let unit = axis.times(length.recip());
+    if (length - 1.0).abs() > 1e-6 {
+        let fault = MachineFault::AxisLength { joint: name.into(), length, unit: unit.0 };
+        return Err((path.into(), fault));
+    }
+    // A unit vector to the last bit or two stays as it is, so that it is written back as it was.
+    Ok(if (length - 1.0).abs() < 1e-15 { axis } else { unit })
+}
+
+fn check_dyad(dyad: &Dyad, path: &str, units: FileUnits) -> Checked<()> {
+    for (field, vector) in [("at", dyad.placement.at), ("rotation", dyad.placement.rotation)] {
+        let [x, y, z] = vector.0;
+        finite(&format!("{path}.{field}"), (x, y, z), &format!("a number of `{field}`"))?;
+    }
+    if let Some(tolerance) = dyad.tolerance {
+        tolerance.check().map_err(|fault| (format!("{path}.tolerance"), fault))?;
+    }
+    if let Some(MassPoint { mass, .. }) = dyad.mass
+        && !(mass.is_finite() && (0.0..LARGEST).contains(&mass))
+    {
+        return Err((format!("{path}.mass"), MachineFault::Mass { frame: dyad.frame.clone(), value: mass }));
+    }
+    let Some(joint) = &dyad.joint else { return Ok(()) };
+    usable_name(&format!("{path}.joint.name"), "joint", &joint.name)?;
+    unit_axis(joint.axis, &joint.name, &format!("{path}.joint.axis"))?;
+    if let Some((from, to)) = joint.travel.filter(|(from, to)| from >= to) {
+        let unit = match joint.kind {
+            JointKind::Prismatic => units.length,
+            JointKind::Revolute => units.angle,
+        };
+        let fault = MachineFault::TravelReversed {
+            joint: joint.name.clone(),
+            from: unit.from_si(from),
+            to: unit.from_si(to),
+        };
+        return Err((format!("{path}.joint.travel"), fault));
+    }
+    if let Some(NcWord { address, sign }) = &joint.nc {
+        let fits = address.starts_with(|c: char| c.is_ascii_alphabetic())
+            && address.chars().all(|c| c.is_ascii_alphanumeric());
+        if !fits || sign.abs() != 1 {
+            let fault =
+                MachineFault::NcWord { joint: joint.name.clone(), address: address.clone(), sign: *sign };
+            return Err((format!("{path}.joint.nc"), fault));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,128 @@
+//! From a machine to text; reading it back gives the same machine.
+
+use ron::ser::PrettyConfig;
+
+use super::form::{
+    AngleUnit, AxisForm, DyadForm, JointBody, JointForm, LengthUnit, MachineForm, NcForm, ToleranceForm, Triple,
+    UnitsForm,
+};
+use super::{Dyad, FileUnits, Joint, JointKind, Machine, Tolerance};
+use crate::lie::Vec3;
+use crate::units::Unit;
+
+impl Machine {
+    /// The machine as a RON text in its own units.
+    pub fn to_ron(&self) -> String {
+        to_text(&self.to_form())
+    }
+
+    pub(crate) fn to_form(&self) -> MachineForm {
+        let units = self.units;
+        let forms = |dyads: &[Dyad]| dyads.iter().map(|d| dyad(d, units)).collect();
+        let (workpiece, tool) = self.dyads.split_at(self.workpiece_count);
+        let gravity = self.gravity_b;
+        MachineForm {
+            name: self.name.clone(),
+            about: self.about.clone(),
+            units: UnitsForm { length: length_word(units.length), angle: angle_word(units.angle) },
+            gravity: (gravity.0 != [0.0, 0.0, -1.0]).then_some(triple(gravity)),
+            tolerance: (self.tolerance != Tolerance::DEFAULT).then(|| tolerance(self.tolerance, units)),
+            workpiece: forms(workpiece),
+            tool: forms(tool),
+            calibration: None,
+        }
+    }
+}
+
+/// A form as the text that is written to files: one dyad a line, numbers as short as they can be.
+pub(crate) fn to_text(form: &MachineForm) -> String {
+    let config = PrettyConfig::new()
+        .depth_limit(2)
+        .struct_names(false)
+        .indentor("    ")
+        .extensions(ron::extensions::Extensions::empty())
+        .compact_maps(true);
+    let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+    let text = options.to_string_pretty(form, config).expect("a machine form has nothing that RON cannot write");
+    format!("Machine{text}\n")
+}
+
+fn length_word(unit: Unit) -> LengthUnit {
+    match unit.symbol {
+        "mm" => LengthUnit::mm,
+        "um" => LengthUnit::um,
+        "nm" => LengthUnit::nm,
+        "in" => LengthUnit::r#in,
+        _ => LengthUnit::m,
+    }
+}
+
+fn angle_word(unit: Unit) -> AngleUnit {
+    match unit.symbol {
+        "mrad" => AngleUnit::mrad,
+        "urad" => AngleUnit::urad,
+        "deg" => AngleUnit::deg,
+        "arcsec" => AngleUnit::arcsec,
+        _ => AngleUnit::rad,
+    }
+}
+
+pub(crate) fn triple(Vec3([x, y, z]): Vec3<f64>) -> Triple {
+    (x, y, z)
+}
+
+/// A vector in SI as the file's numbers.
+pub(crate) fn in_unit(vector: Vec3<f64>, unit: Unit) -> Triple {
+    triple(Vec3(vector.0.map(|c| unit.write_si(c))))
+}
+
+fn tolerance(tolerance: Tolerance, units: FileUnits) -> ToleranceForm {
+    ToleranceForm {
+        translation: units.length.write_si(tolerance.translation),
+        rotation: units.angle.write_si(tolerance.rotation),
+    }
+}
+
+fn dyad(dyad: &Dyad, units: FileUnits) -> DyadForm {
+    let some = |vector: Vec3<f64>, unit| (vector.0 != [0.0; 3]).then(|| in_unit(vector, unit));
+    DyadForm {
+        frame: dyad.frame.clone(),
+        at: some(dyad.placement.at, units.length),
+        rotation: some(dyad.placement.rotation, units.angle),
+        moves: None,
+        joint: dyad.joint.as_ref().map(|j| joint(j, &dyad.frame, units)),
+        mass: dyad.mass.map(|m| m.mass),
+        centre_of_mass: dyad.mass.and_then(|m| some(m.centre, units.length)),
+        tolerance: dyad.tolerance.map(|t| tolerance(t, units)),
+    }
+}
+
+fn joint(joint: &Joint, frame: &str, units: FileUnits) -> JointForm {
+    let unit = match joint.kind {
+        JointKind::Prismatic => units.length,
+        JointKind::Revolute => units.angle,
+    };
+    let body = JointBody {
+        axis: axis(joint.axis),
+        name: (joint.name != frame).then(|| joint.name.clone()),
+        travel: joint.travel.map(|(from, to)| (unit.write_si(from), unit.write_si(to))),
+        follows: joint.follows.clone(),
+        nc: joint.nc.as_ref().map(|nc| NcForm { address: nc.address.clone(), sign: nc.sign }),
+    };
+    match joint.kind {
+        JointKind::Prismatic => JointForm::Prismatic(body),
+        JointKind::Revolute => JointForm::Revolute(body),
+    }
+}
+
+fn axis(axis: Vec3<f64>) -> AxisForm {
+    for (k, word) in ["x", "y", "z"].into_iter().enumerate() {
+        for (sign, prefix) in [(1.0, ""), (-1.0, "-")] {
+            let unit: [f64; 3] = std::array::from_fn(|i| if i == k { sign } else { 0.0 });
+            if axis.0 == unit {
+                return AxisForm::Word(format!("{prefix}{word}"));
+            }
+        }
+    }
+    AxisForm::Vector(triple(axis))
+}

@@ -1,0 +1,127 @@
+//! The one small trait that lets the same kinematics run on `f64`, on dual numbers and, later, on SIMD lanes.
+//!
+//! About a dozen operations, none of which branches: code that needs a case distinction says [`Scalar::select_below`].
+//! Constants are made from a value at hand with [`Scalar::lift`], because lanes need the token that a value carries.
+
+use std::fmt::Debug;
+use std::ops::{Add, Mul, Neg, Sub};
+
+use num_dual::{Dual64, DualNum, DualSVec64};
+
+/// A number that the kinematic kernels can work with: `f64`, [`Dual64`], [`DualSVec64`].
+///
+/// Dimensionless by itself; the functions that take it say whether it stands for m, rad or 1.
+pub trait Scalar:
+    Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    /// The constant `value`, of the same kind as `self`; a dual's derivative part is zero.
+    fn lift(self, value: f64) -> Self;
+
+    /// Square root. The argument must be positive where a derivative is wanted.
+    fn sqrt(self) -> Self;
+
+    /// `1 / self`.
+    fn recip(self) -> Self;
+
+    /// Sine and cosine of an angle in rad.
+    fn sin_cos(self) -> (Self, Self);
+
+    /// Angle in rad of the point (`x`, `self`), as [`f64::atan2`].
+    fn atan2(self, x: Self) -> Self;
+
+    /// `below` where `self < limit`, `otherwise` elsewhere; for duals the real part decides.
+    fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self;
+
+    /// `self * factor`.
+    #[inline(always)]
+    fn scale(self, factor: f64) -> Self {
+        self * self.lift(factor)
+    }
+
+    /// `self + value`.
+    #[inline(always)]
+    fn offset(self, value: f64) -> Self {
+        self + self.lift(value)
+    }
+}
+
+impl Scalar for f64 {
+    #[inline(always)]
+    fn lift(self, value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        f64::recip(self)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        f64::sin_cos(self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        f64::atan2(self, x)
+    }
+    #[inline(always)]
+    fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self {
+        if self < limit { below } else { otherwise }
+    }
+}
+
+impl Scalar for Dual64 {
+    #[inline(always)]
+    fn lift(self, value: f64) -> Self {
+        Dual64::from(value)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        DualNum::sqrt(&self)
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        DualNum::recip(&self)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        DualNum::sin_cos(&self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        DualNum::atan2(&self, x)
+    }
+    #[inline(always)]
+    fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self {
+        if self.re < limit { below } else { otherwise }
+    }
+}
+
+impl<const N: usize> Scalar for DualSVec64<N> {
+    #[inline(always)]
+    fn lift(self, value: f64) -> Self {
+        DualSVec64::from(value)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        DualNum::sqrt(&self)
+    }
+    #[inline(always)]
+    fn recip(self) -> Self {
+        DualNum::recip(&self)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        DualNum::sin_cos(&self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: Self) -> Self {
+        DualNum::atan2(&self, x)
+    }
+    #[inline(always)]
+    fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self {
+        if self.re < limit { below } else { otherwise }
+    }
+}
