@@ -4,12 +4,14 @@
 
 mod calibration;
 pub mod chain;
+pub mod check;
 mod document;
 pub mod error;
 pub mod lie;
 pub mod machine;
 pub mod recording;
 mod scalar;
+pub mod sensor;
 pub mod units;
 
 pub use chain::{Chain, Sweep};

@@ -15,5 +15,6 @@ mod vec3;
 
 pub use mat3::Mat3;
 pub use pose::Pose;
+pub(crate) use twist::inverse_left_jacobian_so3;
 pub use twist::{Adjoint, Twist, Wrench};
 pub use vec3::Vec3;

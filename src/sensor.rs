@@ -1,0 +1,147 @@
+//! What an instrument reads on a machine, and how that reading changes with every unknown.
+//!
+//! A [`Sensor`] turns a [`Sweep`] into up to six scalar readings. Each reading comes with one wrench (how it answers to a small
+//! twist of the tool seen from the workpiece), which the chain carries into the row of the Jacobian, `docs/model.md` (15) to (19).
+
+use crate::chain::Sweep;
+use crate::lie::{Mat3, Vec3, Wrench, inverse_left_jacobian_so3};
+use crate::scalar::Scalar;
+use crate::units::Quantity;
+
+/// The most readings that one sample has: a pose.
+pub const MOST_READINGS: usize = 6;
+
+/// Kind of instrument, with what is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Sensor {
+    /// Distance from the workpiece point to the tool point, less the nominal length unless `absolute`, m.
+    Distance {
+        /// Whether the reading is the distance itself.
+        absolute: bool,
+    },
+    /// Position of the tool point in frame `w`, m.
+    Position,
+    /// Position of the tool point in frame `w`, m, and the rotation of frame `t`, rad.
+    Pose,
+    /// Movement of the tool point along a unit vector of frame `w`, m.
+    Displacement {
+        /// The unit vector.
+        direction_w: Vec3<f64>,
+    },
+    /// Displacement of one joint, m or rad.
+    Joint {
+        /// Index of the dyad whose joint it is.
+        dyad: usize,
+    },
+}
+
+/// Values that belong to an instrument and may be unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorState<S> {
+    /// Measured point in frame `t`, m.
+    pub tool_point_t: Vec3<S>,
+    /// Measured point in frame `w`, m.
+    pub workpiece_point_w: Vec3<S>,
+    /// Nominal length that a relative distance refers to, m.
+    pub length: S,
+    /// Reading at zero, m or rad.
+    pub zero: S,
+}
+
+/// One scalar reading of the model.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading<S> {
+    /// What the instrument would read, m or rad. For the rotation part of a pose: minus the residual, see [`Sensor::readings`].
+    pub value: S,
+    /// Change of the reading with a small twist of the tool seen from the workpiece, in frame `w`.
+    pub by_twist_w: Wrench<S>,
+    /// Change of the reading with the tool point, in frame `t`.
+    pub by_tool_point_t: Vec3<S>,
+}
+
+impl Sensor {
+    /// How many scalar readings a sample has.
+    pub fn reading_count(&self) -> usize {
+        match self {
+            Sensor::Position => 3,
+            Sensor::Pose => 6,
+            Sensor::Distance { .. } | Sensor::Displacement { .. } | Sensor::Joint { .. } => 1,
+        }
+    }
+
+    /// Whether this sensor's zero shifts its readings.
+    pub fn has_zero(&self) -> bool {
+        matches!(self, Sensor::Displacement { .. } | Sensor::Joint { .. })
+    }
+
+    /// The quantity of reading `i`; `prismatic` says so of the joint that [`Sensor::Joint`] reads.
+    pub fn quantity(&self, i: usize, prismatic: bool) -> Quantity {
+        match self {
+            Sensor::Pose if i >= 3 => Quantity::Angle,
+            Sensor::Joint { .. } if !prismatic => Quantity::Angle,
+            _ => Quantity::Length,
+        }
+    }
+
+    /// What the instrument reads on the machine at this sweep, for every kind but [`Sensor::Joint`] (which no chain is needed for).
+    ///
+    /// `measured_rotation_w` is the measured rotation of `t` in `w`; the rotation readings of a pose are relative to it,
+    /// `-log(R_measured R_modelᵀ)`, so that measured minus model is the rotation vector that is missing.
+    pub fn readings<S: Scalar>(
+        &self,
+        sweep: &Sweep<S>,
+        state: &SensorState<S>,
+        measured_rotation_w: Mat3<f64>,
+    ) -> ([Reading<S>; MOST_READINGS], usize) {
+        let w_from_t = sweep.w_from_t();
+        let p_w = w_from_t.transform(state.tool_point_t);
+        let like = p_w.0[0];
+        let t_from_w = w_from_t.rotation.transpose();
+        let along = |n_w: Vec3<S>, value: S| Reading {
+            value,
+            by_twist_w: Wrench::at_point(n_w, p_w),
+            by_tool_point_t: t_from_w * n_w,
+        };
+        let unit = |k: usize| Vec3(std::array::from_fn(|i| like.lift(if i == k { 1.0 } else { 0.0 })));
+        let mut readings = [along(unit(0), p_w.0[0]); MOST_READINGS];
+        match self {
+            Sensor::Distance { absolute } => {
+                // (16): the unit vector along the bar is the force of the wrench.
+                let bar = p_w - state.workpiece_point_w;
+                let distance = bar.norm();
+                let value = if *absolute { distance } else { distance - state.length };
+                readings[0] = along(bar.times(distance.recip()), value);
+            }
+            Sensor::Position => {
+                // (15)
+                readings[1] = along(unit(1), p_w.0[1]);
+                readings[2] = along(unit(2), p_w.0[2]);
+            }
+            Sensor::Pose => {
+                readings[1] = along(unit(1), p_w.0[1]);
+                readings[2] = along(unit(2), p_w.0[2]);
+                // (18): φ = log(R_measured R_modelᵀ); its change with a turn of the model is -J⁻¹(-φ).
+                let missing = crate::lie::Pose {
+                    rotation: measured_rotation_w.lift(like) * w_from_t.rotation.transpose(),
+                    translation: Vec3::zero(like),
+                };
+                let phi = missing.rotation_vector();
+                let jacobian = inverse_left_jacobian_so3(-phi);
+                for k in 0..3 {
+                    readings[3 + k] = Reading {
+                        value: -phi.0[k],
+                        by_twist_w: Wrench::couple(Vec3(jacobian.0[k])),
+                        by_tool_point_t: Vec3::zero(like),
+                    };
+                }
+            }
+            Sensor::Displacement { direction_w } => {
+                // (17)
+                let n = direction_w.lift(like);
+                readings[0] = along(n, n.dot(p_w) + state.zero);
+            }
+            Sensor::Joint { .. } => unreachable!("a joint's reading needs no sweep"),
+        }
+        (readings, self.reading_count())
+    }
+}
