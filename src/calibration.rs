@@ -1,5 +1,340 @@
-//! placeholder
+//! The calibrated machine: a machine file with the deviations that recordings have shown.
+//!
+//! A calibrated file is a machine file with one more field, `calibration`; whatever reads a machine reads it too.
+
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
+
+use crate::chain::Chain;
+use crate::document::Document;
+use crate::error::Result;
+use crate::identify::Rms;
+use crate::lie::{Pose, Twist, Vec3};
+use crate::machine::{JointKind, Machine, MachineFault, MachineForm, Placement, at_path, in_unit, to_text};
+
+type Triple = (f64, f64, f64);
+
+/// The field `calibration` of a machine file, in the file's units.
 #[derive(Clone, Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct CalibrationForm {}
+#[serde(rename = "calibration", deny_unknown_fields)]
+pub(crate) struct CalibrationForm {
+    #[serde(default)]
+    samples: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rms_length: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rms_angle: Option<f64>,
+    deviations: Vec<DeviationForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    setups: Vec<PlaceForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    tool_points: Vec<PointForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    zeros: Vec<ZeroForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    lengths: Vec<LengthForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    seen: Vec<SeenForm>,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "deviation", deny_unknown_fields)]
+struct DeviationForm {
+    frame: String,
+    v: Triple,
+    w: Triple,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "setup", deny_unknown_fields)]
+struct PlaceForm {
+    name: String,
+    at: Triple,
+    rotation: Triple,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "tool_point", deny_unknown_fields)]
+struct PointForm {
+    name: String,
+    at: Triple,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "zero", deny_unknown_fields)]
+struct ZeroForm {
+    setup: String,
+    of: String,
+    value: f64,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "length", deny_unknown_fields)]
+struct LengthForm {
+    setup: String,
+    value: f64,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "seen", deny_unknown_fields)]
+struct SeenForm {
+    joint: String,
+    from: f64,
+    to: f64,
+}
+
+/// A machine together with what is known of its deviations. A machine that was never calibrated has none.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CalibratedMachine {
+    machine: Machine,
+    deviations: Vec<Twist<f64>>,
+    /// Frame `w` in the frame before it, by set-up.
+    pub(crate) setups: Vec<(String, Pose<f64>)>,
+    pub(crate) tool_points: Vec<(String, Vec3<f64>)>,
+    /// Set-up, channel, value.
+    pub(crate) zeros: Vec<(String, String, f64)>,
+    pub(crate) lengths: Vec<(String, f64)>,
+    seen: Vec<Option<(f64, f64)>>,
+    samples: u64,
+    rms: Rms,
+}
+
+impl CalibratedMachine {
+    /// A machine without any known deviation.
+    pub fn nominal(machine: Machine) -> Self {
+        let (dyads, commands) = (machine.dyads().len(), machine.commands().len());
+        CalibratedMachine {
+            machine,
+            deviations: vec![Twist::zero(0.0); dyads],
+            setups: Vec::new(),
+            tool_points: Vec::new(),
+            zeros: Vec::new(),
+            lengths: Vec::new(),
+            seen: vec![None; commands],
+            samples: 0,
+            rms: Rms::default(),
+        }
+    }
+
+    /// The machine with these deviations, one per dyad in machine order, m and rad.
+    ///
+    /// # Panics
+    /// If there is not one deviation per dyad.
+    pub fn with_deviations(mut self, deviations: Vec<Twist<f64>>) -> Self {
+        assert_eq!(deviations.len(), self.machine.dyads().len(), "one deviation per dyad");
+        self.deviations = deviations;
+        self
+    }
+
+    /// The machine as declared.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Deviations in machine order, each in its own frame, m and rad. That of `w` is the mean over set-ups with a known frame.
+    pub fn deviations(&self) -> &[Twist<f64>] {
+        &self.deviations
+    }
+
+    /// The calibrated chain, frame `w` as the machine file has it.
+    pub fn chain(&self) -> Chain<f64> {
+        Chain::new(&self.machine, &self.deviations)
+    }
+
+    /// The calibrated chain of a set-up, if the calibration knows it.
+    pub fn chain_of_setup(&self, setup: &str) -> Option<Chain<f64>> {
+        let (_, previous_from_w) = self.setups.iter().find(|(name, _)| name == setup)?;
+        let mut chain = self.chain();
+        chain.set_previous_from_frame(self.machine.w_index(), *previous_from_w);
+        Some(chain)
+    }
+
+    /// Names of the set-ups that were fitted.
+    pub fn setup_names(&self) -> impl Iterator<Item = &str> {
+        self.setups.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// Samples that it was calibrated on.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// RMS of what the calibration left over.
+    pub fn rms(&self) -> Rms {
+        self.rms
+    }
+
+    /// Range of a command in the recordings it was calibrated on, m or rad.
+    pub fn seen(&self, command: usize) -> Option<(f64, f64)> {
+        self.seen[command]
+    }
+
+    /// Whether a vector of commands leaves what the calibration has seen by more than 1 % of the range of any joint.
+    pub fn extrapolates(&self, commands: &[f64]) -> bool {
+        commands.iter().zip(&self.seen).any(|(q, seen)| {
+            seen.is_some_and(|(from, to)| {
+                let slack = 0.01 * (to - from) + 1e-9;
+                *q < from - slack || *q > to + slack
+            })
+        })
+    }
+
+    /// Reads a machine file, calibrated or not.
+    ///
+    /// # Errors
+    /// As [`Machine::open`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::from_document(&Document::open(path)?)
+    }
+
+    /// Reads from a text; `file` is only the name that messages use.
+    ///
+    /// # Errors
+    /// As [`Machine::parse`].
+    pub fn parse(file: impl AsRef<Path>, text: &str) -> Result<Self> {
+        Self::from_document(&Document::new(file, text.to_string())?)
+    }
+
+    fn from_document(document: &Document) -> Result<Self> {
+        let form: MachineForm = document.read()?;
+        let machine = Machine::from_form(&form).map_err(|e| at_path(document, e))?;
+        let mut calibrated = Self::nominal(machine);
+        if let Some(calibration) = &form.calibration {
+            calibrated.fill(calibration).map_err(|e| at_path(document, e))?;
+        }
+        Ok(calibrated)
+    }
+
+    fn fill(&mut self, form: &CalibrationForm) -> std::result::Result<(), (String, MachineFault)> {
+        let units = self.machine.units();
+        let place = |path: String, (x, y, z): Triple, unit: crate::units::Unit| {
+            for (i, value) in [x, y, z].into_iter().enumerate() {
+                checked(format!("{path}[{i}]"), value)?;
+            }
+            Ok(Vec3([x, y, z].map(|c| unit.to_si(c))))
+        };
+        for (i, deviation) in form.deviations.iter().enumerate() {
+            let path = format!("calibration.deviations[{i}]");
+            let Some(j) = self.machine.frame_index(&deviation.frame) else {
+                let frames: Vec<&str> = self.machine.dyads().iter().map(|d| d.frame.as_str()).collect();
+                let fault =
+                    MachineFault::UnknownFrame { frame: deviation.frame.clone(), known: frames.join(", ") };
+                return Err((format!("{path}.frame"), fault));
+            };
+            self.deviations[j] = Twist::new(
+                place(format!("{path}.v"), deviation.v, units.length)?,
+                place(format!("{path}.w"), deviation.w, units.angle)?,
+            );
+        }
+        for (i, setup) in form.setups.iter().enumerate() {
+            let path = format!("calibration.setups[{i}]");
+            let placement = Placement {
+                at: place(format!("{path}.at"), setup.at, units.length)?,
+                rotation: place(format!("{path}.rotation"), setup.rotation, units.angle)?,
+            };
+            self.setups.push((setup.name.clone(), placement.pose()));
+        }
+        for (i, point) in form.tool_points.iter().enumerate() {
+            let at = place(format!("calibration.tool_points[{i}].at"), point.at, units.length)?;
+            self.tool_points.push((point.name.clone(), at));
+        }
+        for (i, zero) in form.zeros.iter().enumerate() {
+            checked(format!("calibration.zeros[{i}].value"), zero.value)?;
+            let value = self.unit_of(&zero.of).to_si(zero.value);
+            self.zeros.push((zero.setup.clone(), zero.of.clone(), value));
+        }
+        for (i, length) in form.lengths.iter().enumerate() {
+            checked(format!("calibration.lengths[{i}].value"), length.value)?;
+            self.lengths.push((length.setup.clone(), units.length.to_si(length.value)));
+        }
+        for (i, seen) in form.seen.iter().enumerate() {
+            checked(format!("calibration.seen[{i}].from"), seen.from)?;
+            checked(format!("calibration.seen[{i}].to"), seen.to)?;
+            let unit = self.unit_of(&seen.joint);
+            if let Some(c) = self.machine.commands().iter().position(|c| *c == seen.joint) {
+                self.seen[c] = Some((unit.to_si(seen.from), unit.to_si(seen.to)));
+            }
+        }
+        self.samples = form.samples;
+        self.rms = Rms {
+            m: form.rms_length.map(|x| units.length.to_si(x)),
+            rad: form.rms_angle.map(|x| units.angle.to_si(x)),
+        };
+        Ok(())
+    }
+
+    /// The file's unit for what a joint reads; anything that is no joint is a length.
+    fn unit_of(&self, joint: &str) -> crate::units::Unit {
+        let units = self.machine.units();
+        match self.machine.joints().find(|(_, j)| j.name == joint) {
+            Some((_, joint)) if joint.kind == JointKind::Revolute => units.angle,
+            _ => units.length,
+        }
+    }
+
+    /// The calibrated machine as a RON text in the machine's own units.
+    pub fn to_ron(&self) -> String {
+        let units = self.machine.units();
+        let mut form = self.machine.to_form();
+        let deviations = (self.machine.dyads().iter().zip(&self.deviations))
+            .map(|(dyad, dh)| DeviationForm {
+                frame: dyad.frame.clone(),
+                v: in_unit(dh.v, units.length),
+                w: in_unit(dh.w, units.angle),
+            })
+            .collect();
+        let place = |(name, pose): &(String, Pose<f64>)| PlaceForm {
+            name: name.clone(),
+            at: in_unit(pose.translation, units.length),
+            rotation: in_unit(pose.rotation_vector(), units.angle),
+        };
+        let seen = (self.machine.commands().iter().zip(&self.seen)).filter_map(|(joint, seen)| {
+            let (from, to) = (*seen)?;
+            let unit = self.unit_of(joint);
+            Some(SeenForm { joint: joint.clone(), from: unit.write_si(from), to: unit.write_si(to) })
+        });
+        form.calibration = Some(CalibrationForm {
+            samples: self.samples,
+            rms_length: self.rms.m.map(|x| units.length.write_si(x)),
+            rms_angle: self.rms.rad.map(|x| units.angle.write_si(x)),
+            deviations,
+            setups: self.setups.iter().map(place).collect(),
+            tool_points: (self.tool_points.iter())
+                .map(|(name, at)| PointForm { name: name.clone(), at: in_unit(*at, units.length) })
+                .collect(),
+            zeros: (self.zeros.iter())
+                .map(|(setup, of, value)| ZeroForm {
+                    setup: setup.clone(),
+                    of: of.clone(),
+                    value: self.unit_of(of).write_si(*value),
+                })
+                .collect(),
+            lengths: (self.lengths.iter())
+                .map(|(setup, value)| LengthForm { setup: setup.clone(), value: units.length.write_si(*value) })
+                .collect(),
+            seen: seen.collect(),
+        });
+        to_text(&form)
+    }
+
+    /// From what an identification has found.
+    pub(crate) fn found(
+        machine: &Machine,
+        deviations: Vec<Twist<f64>>,
+        seen: Vec<Option<(f64, f64)>>,
+        samples: u64,
+        rms: Rms,
+    ) -> Self {
+        let mut calibrated = Self::nominal(machine.clone()).with_deviations(deviations);
+        (calibrated.seen, calibrated.samples, calibrated.rms) = (seen, samples, rms);
+        calibrated
+    }
+}
+
+fn checked(path: String, value: f64) -> std::result::Result<f64, (String, MachineFault)> {
+    if value.is_finite() && value.abs() < 1e9 {
+        return Ok(value);
+    }
+    Err((path, MachineFault::NotFinite { what: "a number of `calibration`".into(), value }))
+}

@@ -12,7 +12,9 @@ mod write;
 
 pub use dyad::{Dyad, Joint, JointKind, MassPoint, NcWord, Placement, Tolerance};
 pub use fault::MachineFault;
-pub(crate) use form::{MachineForm, TwistForm};
+pub(crate) use form::MachineForm;
+pub(crate) use read::at_path;
+pub(crate) use write::{in_unit, to_text};
 
 use crate::lie::Vec3;
 use crate::units::Unit;

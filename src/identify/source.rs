@@ -14,7 +14,24 @@ const CACHED_SAMPLES: u64 = 2_000_000;
 /// Chunks that are worked on at a time when reading from disk.
 const BATCH: usize = 16;
 
-/// One recording with its instrument and the indices of the unknowns that belong to it.
+/// A value that is known, or the index of the unknown that stands for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Known<T> {
+    Value(T),
+    Unknown(usize),
+}
+
+impl<T> Known<T> {
+    /// Index of the unknown.
+    pub fn unknown(&self) -> Option<usize> {
+        match self {
+            Known::Value(_) => None,
+            Known::Unknown(index) => Some(*index),
+        }
+    }
+}
+
+/// One recording with its instrument and the unknowns that belong to it.
 #[derive(Debug)]
 pub(crate) struct Source<'a> {
     pub recording: &'a Recording,
@@ -22,12 +39,12 @@ pub(crate) struct Source<'a> {
     pub sensor: Sensor,
     /// Index of the set-up.
     pub setup: usize,
-    /// Index of the unknown tool point, or the known one (m, frame `t`).
-    pub tool_point: Result<usize, Vec3<f64>>,
-    /// Index of the unknown zero.
-    pub zero: Option<usize>,
-    /// Index of the unknown length, or the known one, m.
-    pub length: Result<usize, f64>,
+    /// Measured point in frame `t`, m.
+    pub tool_point: Known<Vec3<f64>>,
+    /// Reading at zero, m or rad.
+    pub zero: Known<f64>,
+    /// Length that a relative distance refers to, m.
+    pub length: Known<f64>,
     cached: Option<Vec<Chunk>>,
 }
 
@@ -43,7 +60,7 @@ impl Source<'_> {
         self.sensor.quantity(i, prismatic)
     }
 
-    /// Whether frame `w` enters the readings.
+    /// Whether frames `w` and `t` enter the readings.
     pub fn sees_frames(&self) -> bool {
         !matches!(self.sensor, Sensor::Joint { .. })
     }
@@ -99,54 +116,95 @@ impl<'a> Sources<'a> {
 
     fn add(&mut self, recording: &'a Recording, summary: Summary, machine: &Machine) {
         let header = recording.header();
+        let sensor = Sensor::of(header);
         let setup = index_of(&mut self.setups, header.setup.clone());
         self.frame_unknown.resize(self.setups.len(), false);
-        let sensor = match header.measurement {
+        if header.measurement.sees_frames() {
+            self.frame_unknown[setup] |= header.workpiece_frame_unknown;
+        }
+        let zero = if header.zero_unknown && sensor.has_zero() {
+            Known::Unknown(index_of(&mut self.zeros, (setup, channel(&sensor, machine))))
+        } else {
+            Known::Value(0.0)
+        };
+        let length = match header.nominal_length {
+            NominalLength::Unknown if sensor == (Sensor::Distance { absolute: false }) => {
+                Known::Unknown(index_of(&mut self.lengths, setup))
+            }
+            NominalLength::Known(length) => Known::Value(length),
+            _ => Known::Value(0.0),
+        };
+        let tool_point = match &header.tool_point {
+            ToolPoint::Known(point) => Known::Value(*point),
+            ToolPoint::Unknown(name) => Known::Unknown(index_of(&mut self.tool_points, name.clone())),
+        };
+        self.all.push(Source { recording, summary, sensor, setup, tool_point, zero, length, cached: None });
+    }
+
+    /// Samples in all recordings.
+    pub fn samples(&self) -> u64 {
+        self.all.iter().map(|s| s.summary.samples).sum()
+    }
+
+    /// One pass over all samples: `work` on every chunk, on all cores; `merge` in the order of the files, so that the same
+    /// input gives the same sums whatever the number of cores.
+    pub fn pass<T: Send>(
+        &self,
+        work: impl Fn(usize, &Chunk) -> T + Sync,
+        mut merge: impl FnMut(usize, T),
+    ) -> Result<()> {
+        for (index, source) in self.all.iter().enumerate() {
+            if let Some(chunks) = &source.cached {
+                let parts: Vec<T> = chunks.par_iter().map(|chunk| work(index, chunk)).collect();
+                parts.into_iter().for_each(|part| merge(index, part));
+                continue;
+            }
+            let mut chunks = source.recording.chunks()?;
+            loop {
+                let batch: Vec<Chunk> = chunks.by_ref().take(BATCH).collect::<Result<_>>()?;
+                if batch.is_empty() {
+                    break;
+                }
+                let parts: Vec<T> = batch.par_iter().map(|chunk| work(index, chunk)).collect();
+                parts.into_iter().for_each(|part| merge(index, part));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The name under which a zero is shared within its set-up.
+pub(crate) fn channel(sensor: &Sensor, machine: &Machine) -> String {
+    match sensor {
+        Sensor::Joint { dyad } => {
+            machine.dyads()[*dyad].joint.as_ref().map(|joint| joint.name.clone()).unwrap_or_default()
+        }
+        Sensor::Displacement { direction_w: Vec3([x, y, z]) } => {
+            format!("displacement along ({x:.6}, {y:.6}, {z:.6})")
+        }
+        _ => String::new(),
+    }
+}
+
+impl Measurement {
+    /// Whether frames `w` and `t` enter the readings.
+    pub(crate) fn sees_frames(&self) -> bool {
+        !matches!(self, Measurement::Joint { .. })
+    }
+}
+
+impl Sensor {
+    /// The instrument of a recording.
+    pub(crate) fn of(header: &crate::recording::Header) -> Self {
+        match header.measurement {
             Measurement::Distance { absolute } => Sensor::Distance { absolute },
             Measurement::Position => Sensor::Position,
             Measurement::Pose => Sensor::Pose,
-            Measurement::Displacement => Sensor::Displacement {
-                direction_w: header.direction_w.unwrap_or(Vec3([1.0, 0.0, 0.0])),
-            },
-            Measurement::Joint { dyad } => Sensor::Joint { dyad },
-        };
-        if !matches!(sensor, Sensor::Joint { .. }) {
-            self.frame_unknown[setup] |= header.workpiece_frame_unknown;
-        }
-        let zero = (header.zero_unknown && sensor.has_zero()).then(|| {
-            let channel = match &sensor {
-                Sensor::Joint { dyad } => {
-                    machine.dyads()[*dyad].joint.as_ref().map(|j| j.name.clone()).unwrap_or_default()
-                }
-                Sensor::Displacement { direction_w: Vec3([x, y, z]) } => {
-                    format!("displacement along ({x:.4}, {y:.4}, {z:.4})")
-                }
-                _ => String::new(),
-            };
-            index_of(&mut self.zeros, (setup, channel))
-        });
-        let length = match (&sensor, &header.nominal_length) {
-            (Sensor::Distance { absolute: false }, NominalLength::Unknown) => {
-                Ok(index_of(&mut self.lengths, setup))
+            Measurement::Displacement => {
+                // A displacement without direction is refused when the recording is opened.
+                Sensor::Displacement { direction_w: header.direction_w.unwrap_or(Vec3([1.0, 0.0, 0.0])) }
             }
-            (_, NominalLength::Known(length)) => Err(*length),
-            _ => Err(0.0),
-        };
-        let tool_point = match &header.tool_point {
-            ToolPoint::Known(point) => Err(*point),
-            ToolPoint::Unknown(name) => Ok(index_of(&mut self.tool_points, name.clone())),
-        };
-        // `Result<usize, _>` reads as: the index of an unknown, or else the value.
-        let (tool_point, length) = (tool_point, length);
-        self.all.push(Source {
-            recording,
-            summary,
-            sensor,
-            setup,
-            tool_point: tool_point.map_err(Into::into).into_index(),
-            zero,
-            length: length.into_index(),
-            cached: None,
-        });
+            Measurement::Joint { dyad } => Sensor::Joint { dyad },
+        }
     }
 }

@@ -124,14 +124,6 @@ fn plus() -> i8 {
     1
 }
 
-/// A deviation twist (v; w) in the file's units.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-#[serde(rename = "deviation", deny_unknown_fields)]
-pub(crate) struct TwistForm {
-    pub v: Triple,
-    pub w: Triple,
-}
-
 /// An axis: a word in quotes or a vector.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum AxisForm {

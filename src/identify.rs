@@ -1,0 +1,295 @@
+//! Identification: from recordings to the deviations of a machine, `docs/model.md` (20) to (28).
+//!
+//! Exact residuals of all recordings, robust and weighted by the noise, and a prior on the **total** deviation from the machine
+//! file's tolerances, so that what the data do not see stays at zero instead of drifting. The result is data: [`Fit`].
+
+mod align;
+mod fit;
+mod information;
+mod loss;
+mod normal;
+mod solve;
+mod source;
+mod thin;
+mod unknowns;
+
+pub use fit::{BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, Rms, SetupFit, Suspect};
+pub use information::Information;
+pub use loss::Loss;
+pub use solve::{Solver, Stop};
+pub(crate) use fit::measurement_name;
+pub(crate) use source::channel;
+use normal::Evaluator;
+
+use crate::calibration::CalibratedMachine;
+use crate::error::{Error, Result};
+use crate::lie::Twist;
+use crate::machine::Machine;
+use crate::recording::Recording;
+use crate::units::Quantity;
+use information::Information as Info;
+use normal::{Noise, Normal, Tally};
+use solve::{Problem, Solution};
+use source::Sources;
+use unknowns::{Layout, Role, Unknowns};
+
+/// How to identify.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// The walk to the optimum.
+    pub solver: Solver,
+    /// How residuals count.
+    pub loss: Loss,
+    /// Whether the tolerances of the machine file act as a prior on the total deviation.
+    pub prior: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { solver: Solver::default(), loss: Loss::default(), prior: true }
+    }
+}
+
+/// Rounds of re-estimating the noise from the residuals.
+const NOISE_ROUNDS: usize = 12;
+
+/// Identifies the deviations of `machine` from recordings, which may differ in kind and set-up.
+///
+/// # Errors
+/// If a recording cannot be read, no joint moves, or there are fewer readings than a fit needs.
+pub fn calibrate(machine: &Machine, recordings: &[Recording], options: Options) -> Result<(CalibratedMachine, Fit)> {
+    calibrate_with_progress(machine, recordings, options, &|_| {})
+}
+
+/// As [`calibrate`], telling `progress` what it is at.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_with_progress(
+    machine: &Machine,
+    recordings: &[Recording],
+    options: Options,
+    progress: &dyn Fn(&str),
+) -> Result<(CalibratedMachine, Fit)> {
+    let sources = Sources::new(recordings, machine, progress)?;
+    enough_to_start(machine, &sources)?;
+    let layout = Layout::new(machine, &sources);
+    let prior = options.prior && options.solver.uses_prior();
+    let mut problem = Problem {
+        machine,
+        sources: &sources,
+        layout: &layout,
+        loss: Loss::default(),
+        prior: true,
+        free: layout.of_machine().iter().map(|m| !m).collect(),
+    };
+    progress("finding the set-ups");
+    let start = Unknowns::nominal(machine, &sources);
+    let (placed, noise) = place(&problem, start)?;
+    let nominal = placed.normal.tallies.clone();
+
+    progress("identifying the machine");
+    problem.loss = options.loss;
+    problem.prior = prior;
+    problem.free = vec![true; layout.len];
+    let found = settle(&problem, options.solver, placed.unknowns, noise)?;
+    let information = Info::new(&found.solution.normal.matrix, &layout, prior);
+    let calibrated = calibrated(machine, &sources, &found);
+    let fit = fit::report(&problem, &nominal, &found, information, options)?;
+    Ok((calibrated, fit))
+}
+
+/// Finds again only what belongs to the set-up of `recordings`: frame `w`, unknown tool points, zeros and lengths. The machine
+/// stays as it is calibrated.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn fit_setup(
+    calibrated: &CalibratedMachine,
+    recordings: &[Recording],
+    loss: Loss,
+) -> Result<CalibratedMachine> {
+    let machine = calibrated.machine();
+    let sources = Sources::new(recordings, machine, &|_| {})?;
+    let layout = Layout::new(machine, &sources);
+    let problem = Problem {
+        machine,
+        sources: &sources,
+        layout: &layout,
+        loss,
+        prior: true,
+        free: layout.of_machine().iter().map(|m| !m).collect(),
+    };
+    let mut start = Unknowns::nominal(machine, &sources);
+    start.dh = calibrated.deviations().to_vec();
+    start.dh[machine.w_index()] = Twist::zero(0.0);
+    let (placed, noise) = place(&problem, start)?;
+    let found = settle(&problem, Solver::LevenbergMarquardt, placed.unknowns, noise)?;
+    let mut fitted = calibrated.clone();
+    put_setups(&mut fitted, &sources, &found.solution.unknowns);
+    Ok(fitted)
+}
+
+/// The machine with all that was found.
+fn calibrated(machine: &Machine, sources: &Sources, found: &Found) -> CalibratedMachine {
+    let unknowns = &found.solution.unknowns;
+    let mut deviations = unknowns.dh.clone();
+    let known: Vec<_> = unknowns.setups.iter().filter(|s| !s.unknown).map(|s| s.dh).collect();
+    if !known.is_empty() {
+        let sum = known.iter().fold(Twist::zero(0.0), |sum, dh| sum + *dh);
+        deviations[machine.w_index()] = sum.times(1.0 / known.len() as f64);
+    }
+    let seen = (0..machine.commands().len()).map(|c| {
+        let ranges = sources.all.iter().map(|s| s.summary.commands[c]);
+        Some(ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (from, to)| (l.min(from), h.max(to))))
+    });
+    let mut result =
+        CalibratedMachine::found(machine, deviations, seen.collect(), sources.samples(), found.rms());
+    put_setups(&mut result, sources, unknowns);
+    result
+}
+
+/// Frames, tool points, zeros and lengths as found, in place of any of the same name.
+fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &Unknowns) {
+    let setup = |s: usize| sources.setups[s].clone();
+    for (name, frame) in sources.setups.iter().zip(&unknowns.setups) {
+        calibrated.setups.retain(|(known, _)| known != name);
+        calibrated.setups.push((name.clone(), frame.pose()));
+    }
+    for (name, at) in sources.tool_points.iter().zip(&unknowns.tool_points) {
+        calibrated.tool_points.retain(|(known, _)| known != name);
+        calibrated.tool_points.push((name.clone(), *at));
+    }
+    for ((s, of), value) in sources.zeros.iter().zip(&unknowns.zeros) {
+        calibrated.zeros.retain(|(known, channel, _)| (known, channel) != (&sources.setups[*s], of));
+        calibrated.zeros.push((setup(*s), of.clone(), *value));
+    }
+    for (s, value) in sources.lengths.iter().zip(&unknowns.lengths) {
+        calibrated.lengths.retain(|(known, _)| *known != sources.setups[*s]);
+        calibrated.lengths.push((setup(*s), *value));
+    }
+}
+
+/// A solution and the noise that it was weighted with.
+pub(crate) struct Found {
+    pub solution: Solution,
+    pub noise: Vec<Noise>,
+    /// Noise that the residuals show, by recording, before a stated `sigma` overrides it.
+    pub seen: Vec<Noise>,
+}
+
+impl Found {
+    /// Root mean square of residual lengths and angles over all samples, m and rad.
+    pub fn rms(&self) -> Rms {
+        Rms::over(&self.solution.normal.tallies)
+    }
+}
+
+/// Set-ups found from nothing and then exactly, the machine held.
+fn place(problem: &Problem, mut start: Unknowns) -> Result<(Solution, Vec<Noise>)> {
+    let (machine, sources) = (problem.machine, problem.sources);
+    let thin = thin::thin(machine, sources)?;
+    align::align(machine, sources, &thin, &mut start);
+    let mut noise = thin::robust_noise(machine, sources, &thin, &start);
+    let mut solution = problem.solve(Solver::LevenbergMarquardt, start, &noise)?;
+    for _ in 0..3 {
+        noise = thin::robust_noise(machine, sources, &thin, &solution.unknowns);
+        solution = problem.solve(Solver::LevenbergMarquardt, solution.unknowns, &noise)?;
+    }
+    Ok((solution, noise))
+}
+
+/// Solves, takes the noise from what is left, and solves again until the noise no longer changes.
+fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>) -> Result<Found> {
+    let mut noise = noise;
+    let mut solution = problem.solve(solver, start.clone(), &noise)?;
+    let mut steps = solution.steps;
+    let mut seen = noise.clone();
+    for _ in 0..NOISE_ROUNDS {
+        seen = noise_left(problem, &solution.normal, &noise);
+        let next = with_stated(problem.sources, &seen);
+        let changed = noise.iter().zip(&next).any(|(a, b)| {
+            let differs = |x: f64, y: f64| (x - y).abs() > 1e-3 * y;
+            differs(a.length, b.length) || differs(a.angle, b.angle)
+        });
+        if !changed {
+            break;
+        }
+        noise = next;
+        // The named rivals regularise by their number of steps, so they always start afresh.
+        let from = if solver.uses_prior() { solution.unknowns.clone() } else { start.clone() };
+        solution = problem.solve(solver, from, &noise)?;
+        steps += solution.steps;
+    }
+    solution.steps = steps;
+    Ok(Found { solution, noise, seen })
+}
+
+/// Noise of every source from the residuals of its kind, freed of the parameters that the fit used up.
+fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Noise> {
+    let sources = &problem.sources.all;
+    let free = problem.layout.mask(|_| true);
+    let used = if problem.free == free {
+        Info::new(&normal.matrix, problem.layout, problem.prior).used
+    } else {
+        problem.free.iter().filter(|f| **f).count() as f64
+    };
+    let kinds: Vec<_> = sources.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
+    let rows: f64 = normal.tallies.iter().map(|t| t.length_weight + t.angle_weight).sum();
+    // Every scalar row bears its part of the parameters that are used up.
+    let left = (1.0 - used / rows).max(0.05);
+    kinds
+        .iter()
+        .zip(present)
+        .map(|(kind, present)| {
+            let mut sum = Tally::default();
+            let own = kinds.iter().zip(&normal.tallies).filter(|(k, _)| *k == kind);
+            own.for_each(|(_, tally)| sum.add(tally));
+            let scale = |sum2: f64, rows: f64, present: f64| {
+                if rows > 0.0 { (sum2 / (rows * left)).sqrt().max(1e-12) } else { present }
+            };
+            Noise {
+                length: scale(sum.weighted_length2, sum.length_weight, present.length),
+                angle: scale(sum.weighted_angle2, sum.angle_weight, present.angle),
+            }
+        })
+        .collect()
+}
+
+/// A stated `sigma` counts unless the residuals are larger: what no model explains is no better known for being stated.
+fn with_stated(sources: &Sources, seen: &[Noise]) -> Vec<Noise> {
+    sources
+        .all
+        .iter()
+        .zip(seen)
+        .map(|(source, seen)| match source.recording.header().sigma {
+            None => *seen,
+            Some(sigma) if sigma.quantity == Quantity::Angle => Noise { angle: sigma.value.max(seen.angle), ..*seen },
+            Some(sigma) => Noise { length: sigma.value.max(seen.length), ..*seen },
+        })
+        .collect()
+}
+
+/// Refuses what cannot be identified at all.
+fn enough_to_start(machine: &Machine, sources: &Sources) -> Result<()> {
+    let moving = (0..machine.commands().len())
+        .any(|c| sources.all.iter().any(|s| s.summary.moving.get(c).copied().unwrap_or(false)));
+    let several = |c: usize| {
+        let ranges = sources.all.iter().map(|s| s.summary.commands[c]);
+        let (low, high) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (from, to)| (l.min(from), h.max(to)));
+        high - low > 1e-9
+    };
+    if sources.samples() < 2 {
+        return Err(Error::Undetermined {
+            what: "there is only one sample in all recordings".into(),
+            mend: "record the same quantity at many positions of the joints".into(),
+        });
+    }
+    if !moving && !(0..machine.commands().len()).any(several) {
+        return Err(Error::Undetermined {
+            what: "no joint moves in any recording: nothing of the machine can be identified".into(),
+            mend: "record while the joints move through their travel".into(),
+        });
+    }
+    Ok(())
+}

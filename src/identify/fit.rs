@@ -1,0 +1,450 @@
+//! The result of an identification as data.
+
+use nalgebra::DVector;
+use serde::Serialize;
+
+use super::normal::{Tally, matrix_in_general, sigmas, standardised};
+use super::solve::Problem;
+use super::unknowns::{Block, Role};
+use super::{Evaluator, Found, Information, Loss, Options, Solver, Stop};
+use crate::error::Result;
+use crate::machine::Machine;
+use crate::sensor::Sensor;
+use crate::units::Quantity;
+
+/// Names of a twist's components in the order (v; w).
+pub const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
+/// Down-weighted samples that are listed one by one; all are counted.
+const LISTED: usize = 50;
+
+/// Root mean square of the residuals' Euclidean norm over samples; `None` where nothing of the kind was measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Rms {
+    /// Of lengths, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub m: Option<f64>,
+    /// Of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rad: Option<f64>,
+}
+
+impl Rms {
+    pub(crate) fn over(tallies: &[Tally]) -> Self {
+        let mean = |pick: fn(&Tally) -> (f64, f64)| {
+            let own: Vec<&Tally> = tallies.iter().filter(|t| pick(t).1 > 0.0).collect();
+            let samples: u64 = own.iter().map(|t| t.samples).sum();
+            let sum: f64 = own.iter().map(|t| pick(t).0).sum();
+            (samples > 0).then(|| (sum / samples as f64).sqrt())
+        };
+        Rms {
+            m: mean(|t| (t.length2, t.length_weight)),
+            rad: mean(|t| (t.angle2, t.angle_weight)),
+        }
+    }
+}
+
+/// Everything that an identification has to say. Numbers in SI.
+#[derive(Clone, Debug, Serialize)]
+pub struct Fit {
+    /// Name of the machine.
+    pub machine: String,
+    /// Samples used.
+    pub samples: u64,
+    /// Rows left out because a number was missing.
+    pub dropped: u64,
+    /// Scalar readings used.
+    pub readings: u64,
+    /// RMS of lengths over samples: with the machine as declared (set-ups fitted), and with the identified deviations, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_m: Option<BeforeAfter>,
+    /// The same for angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_rad: Option<BeforeAfter>,
+    /// One entry a recording.
+    pub recordings: Vec<RecordingFit>,
+    /// The scheme.
+    pub solver: Solver,
+    /// The loss.
+    pub loss: Loss,
+    /// Whether the tolerances acted as a prior.
+    pub prior: bool,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Steps taken, all rounds of noise estimation together.
+    pub steps: usize,
+    /// Half the sum of squared (robust) standardised residuals at the end.
+    pub loss_value: f64,
+    /// How many unknowns there are, set-ups included.
+    pub unknowns: usize,
+    /// How many independent combinations of them these recordings see.
+    pub rank: usize,
+    /// How many would be seen on general poses with all joints moving.
+    pub rank_in_general: usize,
+    /// Every component of every deviation.
+    pub parameters: Vec<ParameterFit>,
+    /// Combinations of deviations, best seen first; `share` 0 means that the data say nothing about it.
+    pub combinations: Vec<Combination>,
+    /// What the recordings leave open of the set-ups themselves, in words.
+    pub open: Vec<String>,
+    /// Set-ups as found.
+    pub setups: Vec<SetupFit>,
+    /// Samples with a weight below one half.
+    pub down_weighted: u64,
+    /// The worst of them.
+    pub suspects: Vec<Suspect>,
+    /// What to be careful about, in sentences.
+    pub warnings: Vec<String>,
+    /// The information behind it.
+    #[serde(skip)]
+    pub information: Information,
+}
+
+/// A figure before and after identification.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BeforeAfter {
+    /// Machine as declared, set-ups fitted.
+    pub nominal: f64,
+    /// With constant deviations.
+    pub geometric: f64,
+}
+
+/// How well one recording is described.
+#[derive(Clone, Debug, Serialize)]
+pub struct RecordingFit {
+    /// File name.
+    pub name: String,
+    /// Set-up; empty for the default one.
+    pub setup: String,
+    /// Kind of measurement.
+    pub measurement: String,
+    /// Samples used.
+    pub samples: u64,
+    /// Rows left out because a number was missing.
+    pub dropped: u64,
+    /// RMS with the machine as declared.
+    pub nominal: Rms,
+    /// RMS with the identified deviations.
+    pub geometric: Rms,
+    /// Standard deviation of one reading that the fit was weighted with, m (rad for an angle).
+    pub sigma: f64,
+    /// Noise seen in the residuals over the stated `sigma`; well above 1 means that something is not modelled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub birge: Option<f64>,
+}
+
+/// One component of a deviation.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParameterFit {
+    /// Frame of the dyad.
+    pub frame: String,
+    /// Set-up, where the component belongs to a frame `w` of its own; empty otherwise.
+    pub setup: String,
+    /// `vx` ... `wz`.
+    pub component: String,
+    /// Identified value, m or rad.
+    pub value: f64,
+    /// Standard error, prior and data together, m or rad.
+    pub std_error: f64,
+    /// Tolerance: standard deviation of the prior, m or rad.
+    pub tolerance: f64,
+    /// What share of it comes from the data, 0 to 1.
+    pub share: f64,
+}
+
+/// A combination of deviations that the data see as one number.
+#[derive(Clone, Debug, Serialize)]
+pub struct Combination {
+    /// What share of it comes from the data, 0 to 1.
+    pub share: f64,
+    /// Its parts, `frame.component`, largest first, in units of their tolerances; small ones left out.
+    pub parts: Vec<(String, f64)>,
+}
+
+/// A set-up as found.
+#[derive(Clone, Debug, Serialize)]
+pub struct SetupFit {
+    /// Name; empty for the default one.
+    pub name: String,
+    /// Whether its frame was found from nothing.
+    pub frame_unknown: bool,
+    /// Origin of frame `w` in the frame before it, m.
+    pub at_m: [f64; 3],
+    /// Rotation vector of frame `w` in the frame before it, rad.
+    pub rotation_rad: [f64; 3],
+}
+
+/// A sample that counted little.
+#[derive(Clone, Debug, Serialize)]
+pub struct Suspect {
+    /// File name.
+    pub recording: String,
+    /// Line in the file.
+    pub line: u64,
+    /// Norm of its residual, m (rad for an angle).
+    pub residual: f64,
+    /// The same in standard deviations of the noise.
+    pub deviations: f64,
+    /// Weight with which it counted, 0 to 1.
+    pub weight: f64,
+}
+
+/// Name of a measurement as recordings spell it.
+pub(crate) fn measurement_name(sensor: &Sensor) -> &'static str {
+    match sensor {
+        Sensor::Distance { .. } => "distance",
+        Sensor::Position => "position",
+        Sensor::Pose => "pose",
+        Sensor::Displacement { .. } => "displacement",
+        Sensor::Joint { .. } => "joint",
+    }
+}
+
+pub(super) fn report(
+    problem: &Problem,
+    nominal: &[Tally],
+    found: &Found,
+    information: Information,
+    options: Options,
+) -> Result<Fit> {
+    let (machine, sources, layout) = (problem.machine, problem.sources, problem.layout);
+    let tallies = &found.solution.normal.tallies;
+    let (before, after) = (Rms::over(nominal), Rms::over(tallies));
+    let pair = |before: Option<f64>, after: Option<f64>| {
+        Some(BeforeAfter { nominal: before?, geometric: after? })
+    };
+    let recordings = (sources.all.iter().enumerate())
+        .map(|(i, source)| {
+            let angle = source.quantity(machine, 0) == Quantity::Angle;
+            let pick = |noise: &super::Noise| if angle { noise.angle } else { noise.length };
+            RecordingFit {
+                name: source.recording.name().to_string(),
+                setup: sources.setups[source.setup].clone(),
+                measurement: measurement_name(&source.sensor).into(),
+                samples: source.summary.samples,
+                dropped: source.summary.dropped,
+                nominal: Rms::over(&nominal[i..=i]),
+                geometric: Rms::over(&tallies[i..=i]),
+                sigma: pick(&found.noise[i]),
+                birge: source.recording.header().sigma.map(|s| pick(&found.seen[i]) / s.value),
+            }
+        })
+        .collect();
+    let readings: u64 =
+        sources.all.iter().map(|s| s.summary.samples * s.sensor.reading_count() as u64).sum();
+    let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
+    let rank_in_general = Information::new(&general, layout, problem.prior).rank;
+    let suspects = suspects(problem, found)?;
+    let fit = Fit {
+        machine: machine.name().into(),
+        samples: sources.samples(),
+        dropped: sources.all.iter().map(|s| s.summary.dropped).sum(),
+        readings,
+        rms_m: pair(before.m, after.m),
+        rms_rad: pair(before.rad, after.rad),
+        recordings,
+        solver: options.solver,
+        loss: options.loss,
+        prior: problem.prior,
+        stop: found.solution.stop,
+        steps: found.solution.steps,
+        loss_value: found.solution.normal.loss,
+        unknowns: layout.len,
+        rank: information.rank,
+        rank_in_general,
+        parameters: parameters(problem, found, &information),
+        combinations: combinations(problem, &information),
+        open: information.open.iter().map(|v| in_words(problem, v)).collect(),
+        setups: setups(problem, found),
+        down_weighted: tallies.iter().map(|t| t.down_weighted).sum(),
+        suspects,
+        warnings: Vec::new(),
+        information,
+    };
+    Ok(Fit { warnings: warnings(problem, &fit), ..fit })
+}
+
+fn setups(problem: &Problem, found: &Found) -> Vec<SetupFit> {
+    let frames = &found.solution.unknowns.setups;
+    (problem.sources.setups.iter().zip(frames))
+        .map(|(name, frame)| {
+            let pose = frame.pose();
+            SetupFit {
+                name: name.clone(),
+                frame_unknown: frame.unknown,
+                at_m: pose.translation.0,
+                rotation_rad: pose.rotation_vector().0,
+            }
+        })
+        .collect()
+}
+
+/// Frame and set-up of a block that has components.
+fn owner(problem: &Problem, block: &Block) -> Option<(String, String)> {
+    let frame = |j: usize| problem.machine.dyads()[j].frame.clone();
+    match block.role {
+        Role::Dyad(j) => Some((frame(j), String::new())),
+        Role::Setup(s) => Some((frame(problem.machine.w_index()), problem.sources.setups[s].clone())),
+        _ => None,
+    }
+}
+
+fn parameters(problem: &Problem, found: &Found, information: &Information) -> Vec<ParameterFit> {
+    let mut all = Vec::new();
+    for block in problem.layout.blocks.iter().filter(|b| b.prior) {
+        let Some((frame, setup)) = owner(problem, block) else { continue };
+        let total = found.solution.unknowns.total(block);
+        for k in 0..block.len {
+            let variance = information.variance[block.offset + k];
+            all.push(ParameterFit {
+                frame: frame.clone(),
+                setup: setup.clone(),
+                component: COMPONENTS[k].into(),
+                value: total[k],
+                std_error: variance.sqrt() * block.scale[k],
+                tolerance: block.scale[k],
+                share: (1.0 - variance).clamp(0.0, 1.0),
+            });
+        }
+    }
+    all
+}
+
+/// Name of every parameter, `frame.component`.
+fn labels(problem: &Problem) -> Vec<String> {
+    let sources = problem.sources;
+    let several = sources.setups.len() > 1;
+    let of = |setup: usize| if several { format!("[{}]", sources.setups[setup]) } else { String::new() };
+    let label = |block: &Block, k: usize| match block.role {
+        Role::Dyad(j) => format!("{}.{}", problem.machine.dyads()[j].frame, COMPONENTS[k]),
+        Role::Setup(s) => format!("w{}.{}", of(s), COMPONENTS[k]),
+        Role::ToolPoint(i) => format!("tool point {}.{}", sources.tool_points[i], ["x", "y", "z"][k]),
+        Role::Zero(i) => format!("zero of {}{}", sources.zeros[i].1, of(sources.zeros[i].0)),
+        Role::Length(i) => format!("nominal length{}", of(sources.lengths[i])),
+    };
+    problem.layout.blocks.iter().flat_map(|b| (0..b.len).map(move |k| label(b, k))).collect()
+}
+
+fn combinations(problem: &Problem, information: &Information) -> Vec<Combination> {
+    let labels = labels(problem);
+    (0..information.strength.len())
+        .map(|i| {
+            let column = information.directions.column(i);
+            let mut parts: Vec<(String, f64)> = (information.positions.iter().zip(column.iter()))
+                .filter(|(_, x)| x.abs() > 0.1)
+                .map(|(at, x)| (labels[*at].clone(), *x))
+                .collect();
+            parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+            Combination { share: information.share(i), parts }
+        })
+        .collect()
+}
+
+/// A direction that nothing determines, in words.
+fn in_words(problem: &Problem, vector: &DVector<f64>) -> String {
+    let labels = labels(problem);
+    let mut parts: Vec<(f64, &str)> =
+        vector.iter().zip(&labels).filter(|(x, _)| x.abs() > 0.1).map(|(x, l)| (*x, l.as_str())).collect();
+    parts.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    let named: Vec<String> = parts.iter().take(4).map(|(x, l)| format!("{x:+.2} {l}")).collect();
+    named.join(" ")
+}
+
+/// One more pass: which samples counted little, and why.
+fn suspects(problem: &Problem, found: &Found) -> Result<Vec<Suspect>> {
+    let (machine, sources) = (problem.machine, problem.sources);
+    let unknowns = &found.solution.unknowns;
+    if found.solution.normal.tallies.iter().all(|t| t.down_weighted == 0) {
+        return Ok(Vec::new());
+    }
+    let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
+    let (commands, loss) = (machine.commands().len(), problem.loss);
+    let mut all: Vec<Suspect> = Vec::new();
+    sources.pass(
+        |index, chunk| {
+            let (source, evaluator) = (&sources.all[index], &evaluators[index]);
+            let sigmas = sigmas(source, machine, found.noise[index]);
+            let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
+            let mut sweep = evaluator.workspace();
+            let mut own = Vec::new();
+            for k in 0..chunk.len {
+                let q = &chunk.commands[k * commands..(k + 1) * commands];
+                let measured = &chunk.values[k * width..(k + 1) * width];
+                let residuals = evaluator.residuals(q, measured, &mut sweep, None);
+                let e2 = standardised(&residuals[..count], &sigmas);
+                let (_, weight) = loss.at(e2);
+                if weight < 0.5 {
+                    own.push(Suspect {
+                        recording: source.recording.name().into(),
+                        line: chunk.lines[k],
+                        residual: residuals[..count.min(3)].iter().map(|r| r * r).sum::<f64>().sqrt(),
+                        deviations: e2.sqrt(),
+                        weight,
+                    });
+                }
+            }
+            own
+        },
+        |_, own| {
+            all.extend(own);
+            all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
+            all.truncate(LISTED);
+        },
+    )?;
+    Ok(all)
+}
+
+fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
+    let (machine, sources) = (problem.machine, problem.sources);
+    let mut warnings: Vec<String> = Vec::new();
+    for source in &sources.all {
+        for warning in &source.summary.warnings {
+            warnings.push(format!("{}: {warning}", source.recording.name()));
+        }
+    }
+    // (22)
+    let needed = fit.rank.max(1) as u64;
+    if fit.readings < 5 * needed {
+        warnings.push(format!(
+            "{} readings for {needed} identifiable parameters: fewer than five each; record more poses, or the figures flatter themselves",
+            fit.readings
+        ));
+    }
+    if fit.rank < fit.rank_in_general {
+        warnings.push(format!(
+            "these recordings see {} combinations of the unknowns; the same instrument on general poses would see {}{}",
+            fit.rank,
+            fit.rank_in_general,
+            still(machine, problem)
+        ));
+    }
+    for open in &fit.open {
+        warnings.push(format!("not seen by the recordings, left as declared: {open}"));
+    }
+    for recording in fit.recordings.iter().filter(|r| r.birge.is_some_and(|b| b > 2.0)) {
+        warnings.push(format!(
+            "{}: residuals are {:.1} times the stated sigma: something besides constant geometry is at work",
+            recording.name,
+            recording.birge.unwrap_or(1.0)
+        ));
+    }
+    if fit.down_weighted > 0 {
+        warnings.push(format!("{} samples count less than half because they lie far off", fit.down_weighted));
+    }
+    if fit.stop == Stop::Steps && !matches!(fit.solver, Solver::FixedDamping { .. }) {
+        warnings.push("the number of steps was used up before the fit settled".into());
+    }
+    warnings
+}
+
+/// Which joints stand still, as the end of a sentence.
+fn still(machine: &Machine, problem: &Problem) -> String {
+    let still: Vec<&str> = (0..machine.commands().len())
+        .filter(|c| problem.sources.all.iter().all(|s| !s.summary.moving[*c]))
+        .map(|c| machine.commands()[c].as_str())
+        .collect();
+    if still.is_empty() {
+        "; vary the joints independently of each other".into()
+    } else {
+        format!("; these joints never move: {}", still.join(", "))
+    }
+}

@@ -1,0 +1,82 @@
+//! A thin selection of samples for what does not need all of them: alignment and robust scales.
+
+use super::normal::{Evaluator, Noise};
+use super::source::Sources;
+use super::unknowns::Unknowns;
+use crate::error::Result;
+use crate::machine::Machine;
+use crate::units::Quantity;
+
+/// As many samples of one recording at most.
+const MOST: u64 = 2000;
+
+/// One sample.
+pub(crate) struct Thin {
+    pub source: usize,
+    pub q: Vec<f64>,
+    pub values: Vec<f64>,
+}
+
+/// Evenly spread samples of every recording.
+pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
+    let commands = machine.commands().len();
+    let mut seen = vec![0u64; sources.all.len()];
+    let mut all = Vec::new();
+    // The chunks come in order, so the running number of a sample is known when they are merged.
+    sources.pass(
+        |_, chunk| (chunk.commands.clone(), chunk.values.clone(), chunk.len),
+        |index, (q, values, len)| {
+            let source = &sources.all[index];
+            let width = source.recording.value_count();
+            let stride = source.summary.samples.div_ceil(MOST).max(1);
+            for k in 0..len {
+                if (seen[index] + k as u64).is_multiple_of(stride) {
+                    all.push(Thin {
+                        source: index,
+                        q: q[k * commands..(k + 1) * commands].to_vec(),
+                        values: values[k * width..(k + 1) * width].to_vec(),
+                    });
+                }
+            }
+            seen[index] += len as u64;
+        },
+    )?;
+    Ok(all)
+}
+
+/// Robust noise of each source from the median of its residuals; sources of one kind share it.
+pub(crate) fn robust_noise(machine: &Machine, sources: &Sources, thin: &[Thin], unknowns: &Unknowns) -> Vec<Noise> {
+    let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
+    let kinds: Vec<_> = sources.all.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
+    let mut sizes: Vec<[Vec<f64>; 2]> = sources.all.iter().map(|_| Default::default()).collect();
+    for sample in thin {
+        let (evaluator, source) = (&evaluators[sample.source], &sources.all[sample.source]);
+        let mut sweep = evaluator.workspace();
+        let residuals = evaluator.residuals(&sample.q, &sample.values, &mut sweep, None);
+        // The first source of this kind collects for all of them.
+        let group = kinds.iter().position(|k| *k == kinds[sample.source]).unwrap_or(sample.source);
+        for (i, r) in residuals.iter().take(source.sensor.reading_count()).enumerate() {
+            let angle = source.quantity(machine, i) == Quantity::Angle;
+            sizes[group][usize::from(angle)].push(r.abs());
+        }
+    }
+    let scales: Vec<[f64; 2]> = sizes.into_iter().map(|group| group.map(median_scale)).collect();
+    kinds
+        .iter()
+        .map(|kind| {
+            let group = kinds.iter().position(|k| k == kind).unwrap_or(0);
+            let [length, angle] = scales[group];
+            Noise { length, angle }
+        })
+        .collect()
+}
+
+/// 1.4826 times the median of absolute values, never zero.
+fn median_scale(mut sizes: Vec<f64>) -> f64 {
+    sizes.retain(|s| s.is_finite());
+    if sizes.is_empty() {
+        return 1.0;
+    }
+    sizes.sort_by(f64::total_cmp);
+    (1.4826 * sizes[sizes.len() / 2]).max(1e-12)
+}

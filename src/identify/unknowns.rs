@@ -1,0 +1,212 @@
+//! The unknowns of an identification: where each stands in the parameter vector, and their present values.
+
+use nalgebra::DVector;
+
+use super::source::{Known, Source, Sources};
+use crate::chain::Chain;
+use crate::lie::{Pose, Twist, Vec3};
+use crate::machine::Machine;
+use crate::sensor::SensorState;
+
+/// What a block of parameters stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Deviation of dyad `j` (never `w`: that one belongs to the set-ups), six numbers.
+    Dyad(usize),
+    /// Frame `w` of a set-up, six numbers.
+    Setup(usize),
+    /// Unknown tool point, three numbers.
+    ToolPoint(usize),
+    /// Unknown zero.
+    Zero(usize),
+    /// Unknown length.
+    Length(usize),
+}
+
+/// A block of the parameter vector.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block {
+    pub role: Role,
+    pub offset: usize,
+    pub len: usize,
+    /// Prior standard deviations; where there is no prior, only the size by which the parameters are scaled. m or rad.
+    pub scale: [f64; 6],
+    /// Whether there is a prior on the total value.
+    pub prior: bool,
+}
+
+/// The parameter vector's order.
+#[derive(Clone, Debug)]
+pub(crate) struct Layout {
+    pub blocks: Vec<Block>,
+    pub len: usize,
+}
+
+impl Layout {
+    /// Every dyad but `w`, then frames, tool points, zeros and lengths of the set-ups.
+    pub fn new(machine: &Machine, sources: &Sources) -> Self {
+        let mut layout = Layout { blocks: Vec::new(), len: 0 };
+        let tolerance = |j| machine.tolerance(j).to_array();
+        for j in (0..machine.dyads().len()).filter(|j| *j != machine.w_index()) {
+            layout.push(Role::Dyad(j), 6, tolerance(j), true);
+        }
+        for (s, unknown) in sources.frame_unknown.iter().enumerate() {
+            if sources.all.iter().any(|source| source.setup == s && source.sees_frames()) {
+                layout.push(Role::Setup(s), 6, tolerance(machine.w_index()), !unknown);
+            }
+        }
+        let free = |j: usize| {
+            let [translation, .., rotation] = tolerance(j);
+            (translation, rotation)
+        };
+        for i in 0..sources.tool_points.len() {
+            layout.push(Role::ToolPoint(i), 3, [free(machine.t_index()).0; 6], false);
+        }
+        for i in 0..sources.zeros.len() {
+            let own = |s: &&Source| s.zero == Known::Unknown(i);
+            let angular = sources.all.iter().find(own).is_some_and(|s| {
+                s.quantity(machine, 0) == crate::units::Quantity::Angle
+            });
+            let (translation, rotation) = free(machine.t_index());
+            layout.push(Role::Zero(i), 1, [if angular { rotation } else { translation }; 6], false);
+        }
+        for i in 0..sources.lengths.len() {
+            layout.push(Role::Length(i), 1, [free(machine.t_index()).0; 6], false);
+        }
+        layout
+    }
+
+    fn push(&mut self, role: Role, len: usize, scale: [f64; 6], prior: bool) {
+        self.blocks.push(Block { role, offset: self.len, len, scale, prior });
+        self.len += len;
+    }
+
+    /// The block of this role, if the data have such an unknown.
+    pub fn block(&self, role: Role) -> Option<&Block> {
+        self.blocks.iter().find(|b| b.role == role)
+    }
+
+    /// The scales of all parameters, in order.
+    pub fn scales(&self) -> DVector<f64> {
+        let scales = self.blocks.iter().flat_map(|b| b.scale[..b.len].iter().copied());
+        DVector::from_iterator(self.len, scales)
+    }
+
+    /// Which parameters belong to the machine, in order: everything but what a set-up brings along.
+    pub fn of_machine(&self) -> Vec<bool> {
+        self.mask(|b| matches!(b.role, Role::Dyad(_)))
+    }
+
+    /// Which parameters fulfil a condition on their block, in order.
+    pub fn mask(&self, holds: impl Fn(&Block) -> bool) -> Vec<bool> {
+        self.blocks.iter().flat_map(|b| std::iter::repeat_n(holds(b), b.len)).collect()
+    }
+}
+
+/// Frame `w` of one set-up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SetupFrame {
+    /// Pose of `w` in the frame before it, before `dh`.
+    pub previous_from_w: Pose<f64>,
+    /// Deviation behind it; stays zero where the frame is found from nothing (the pose itself moves then).
+    pub dh: Twist<f64>,
+    /// Whether the frame is found from nothing.
+    pub unknown: bool,
+}
+
+impl SetupFrame {
+    /// The frame with its deviation.
+    pub fn pose(&self) -> Pose<f64> {
+        self.previous_from_w * Pose::exp(self.dh)
+    }
+}
+
+/// Present values of all unknowns.
+#[derive(Clone, Debug)]
+pub(crate) struct Unknowns {
+    /// Deviations of all dyads; that of `w` stays zero here.
+    pub dh: Vec<Twist<f64>>,
+    pub setups: Vec<SetupFrame>,
+    pub tool_points: Vec<Vec3<f64>>,
+    pub zeros: Vec<f64>,
+    pub lengths: Vec<f64>,
+}
+
+impl Unknowns {
+    /// Everything as the machine file says.
+    pub fn nominal(machine: &Machine, sources: &Sources) -> Self {
+        let zero = Twist::zero(0.0);
+        let frame = |unknown: &bool| SetupFrame {
+            previous_from_w: machine.dyads()[machine.w_index()].placement.pose(),
+            dh: zero,
+            unknown: *unknown,
+        };
+        Unknowns {
+            dh: vec![zero; machine.dyads().len()],
+            setups: sources.frame_unknown.iter().map(frame).collect(),
+            tool_points: vec![Vec3([0.0; 3]); sources.tool_points.len()],
+            zeros: vec![0.0; sources.zeros.len()],
+            lengths: vec![0.0; sources.lengths.len()],
+        }
+    }
+
+    /// The chain that a source's set-up sees.
+    pub fn chain(&self, machine: &Machine, setup: usize) -> Chain<f64> {
+        let mut chain = Chain::new(machine, &self.dh);
+        chain.set_previous_from_frame(machine.w_index(), self.setups[setup].pose());
+        chain
+    }
+
+    /// The instrument's own values for a source.
+    pub fn sensor_state(&self, source: &Source) -> SensorState<f64> {
+        let value = |known: Known<f64>, unknowns: &[f64]| match known {
+            Known::Value(value) => value,
+            Known::Unknown(i) => unknowns[i],
+        };
+        SensorState {
+            tool_point_t: match source.tool_point {
+                Known::Value(point) => point,
+                Known::Unknown(i) => self.tool_points[i],
+            },
+            workpiece_point_w: source.recording.header().workpiece_point,
+            length: value(source.length, &self.lengths),
+            zero: value(source.zero, &self.zeros),
+        }
+    }
+
+    /// The total of a block that has a prior, m and rad.
+    pub fn total(&self, block: &Block) -> [f64; 6] {
+        match block.role {
+            Role::Dyad(j) => self.dh[j].to_array(),
+            Role::Setup(s) => self.setups[s].dh.to_array(),
+            Role::ToolPoint(_) | Role::Zero(_) | Role::Length(_) => [0.0; 6],
+        }
+    }
+
+    /// The unknowns after a step in the parameter vector, m and rad.
+    pub fn stepped(&self, layout: &Layout, step: &DVector<f64>) -> Self {
+        let mut next = self.clone();
+        for block in &layout.blocks {
+            let at = |k: usize| step[block.offset + k];
+            match block.role {
+                Role::Dyad(j) => next.dh[j] = self.dh[j] + Twist::from_array(std::array::from_fn(at)),
+                Role::Setup(s) => {
+                    let step = Twist::from_array(std::array::from_fn(at));
+                    let frame = &mut next.setups[s];
+                    if frame.unknown {
+                        // Relinearised every step: the pose moves, no deviation is left.
+                        frame.previous_from_w = frame.previous_from_w * Pose::exp(step);
+                    } else {
+                        frame.dh = frame.dh + step;
+                    }
+                }
+                Role::ToolPoint(i) => {
+                    next.tool_points[i] = next.tool_points[i] + Vec3(std::array::from_fn(at));
+                }
+                Role::Zero(i) => next.zeros[i] += at(0),
+                Role::Length(i) => next.lengths[i] += at(0),
+            }
+        }
+        next
+    }
+}
