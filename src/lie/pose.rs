@@ -173,9 +173,6 @@ impl<S: Scalar> Mul for Pose<S> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, inner: Self) -> Self {
-        Pose {
-            rotation: self.rotation * inner.rotation,
-            translation: self.transform(inner.translation),
-        }
+        Pose { rotation: self.rotation * inner.rotation, translation: self.transform(inner.translation) }
     }
 }

@@ -62,10 +62,7 @@ impl<S: Scalar> Coefficients<S> {
             b: choose(alternating(t2, |k| inverse_factorial(2 * k + 2)), b),
             c: choose(alternating(t2, |k| inverse_factorial(2 * k + 3)), c),
             d: choose(alternating(t2, |k| inverse_factorial(2 * k + 4)), d),
-            e: choose(
-                alternating(t2, |k| (k + 1) as f64 * inverse_factorial(2 * k + 5)),
-                e,
-            ),
+            e: choose(alternating(t2, |k| (k + 1) as f64 * inverse_factorial(2 * k + 5)), e),
         }
     }
 }

@@ -92,9 +92,9 @@ impl<S: Scalar> Twist<S> {
         let (w, v) = (Mat3::hat(self.w), Mat3::hat(self.v));
         let (ww, wv, vw) = (w * w, w * v, v * w);
         let wvw = wv * w;
-        // (7): J = I + b W + c W²
+        // (7a): J = I + b W + c W²
         let diagonal = Mat3::identity(k.a) + w.times(k.b) + ww.times(k.c);
-        // (8): Q = V/2 + c (WV + VW + WVW) + d (W²V + VW² - 3 WVW) + e (WVW² + W²VW)
+        // (7b): Q = V/2 + c (WV + VW + WVW) + d (W²V + VW² - 3 WVW) + e (WVW² + W²VW)
         let coupling = v.times(k.a.lift(0.5))
             + (wv + vw + wvw).times(k.c)
             + (ww * v + v * ww + wvw.times(k.a.lift(-3.0))).times(k.d)
