@@ -15,6 +15,9 @@ const MOST_BYTES: usize = 8 << 20;
 /// Deeper nesting is refused before any reader recurses into it.
 const MOST_DEPTH: usize = 32;
 
+/// `travel: (0, 1)` instead of `Some((0, 1))`, and `Revolute(axis: "z")` instead of `Revolute((axis: "z"))`.
+pub(crate) const EXTENSIONS: Extensions = Extensions::IMPLICIT_SOME.union(Extensions::UNWRAP_VARIANT_NEWTYPES);
+
 /// A text in RON with the name of the file that it came from.
 pub(crate) struct Document {
     file: PathBuf,
@@ -72,7 +75,7 @@ impl Document {
 
     /// The text as a value; a mistake names its line and column.
     pub fn read<T: DeserializeOwned>(&self) -> Result<T> {
-        let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
+        let options = ron::Options::default().with_default_extension(EXTENSIONS);
         options.from_str(&self.text).map_err(|e| {
             let start = e.span.start;
             let (message, mend) = explain(&e.code);

@@ -7,6 +7,7 @@ use super::form::{
     UnitsForm,
 };
 use super::{Dyad, FileUnits, Joint, JointKind, Machine, Tolerance};
+use crate::document::EXTENSIONS;
 use crate::lie::Vec3;
 use crate::units::Unit;
 
@@ -42,7 +43,7 @@ pub(crate) fn to_text(form: &MachineForm) -> String {
         .indentor("    ")
         .extensions(ron::extensions::Extensions::empty())
         .compact_maps(true);
-    let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+    let options = ron::Options::default().with_default_extension(EXTENSIONS);
     let text = options.to_string_pretty(form, config).expect("a machine form has nothing that RON cannot write");
     format!("Machine{text}\n")
 }
