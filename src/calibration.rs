@@ -311,7 +311,10 @@ impl CalibratedMachine {
                 })
                 .collect(),
             lengths: (self.lengths.iter())
-                .map(|(setup, value)| LengthForm { setup: setup.clone(), value: units.length.write_si(*value) })
+                .map(|(setup, value)| LengthForm {
+                    setup: setup.clone(),
+                    value: units.length.write_si(*value),
+                })
                 .collect(),
             seen: seen.collect(),
         });

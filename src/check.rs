@@ -123,17 +123,11 @@ fn random_twist(tolerance: [f64; 6], size: f64, rng: &mut StdRng) -> Twist<f64> 
 impl<'a> Case<'a> {
     fn random(machine: &'a Machine, sensor: &'a Sensor, size: f64, rng: &mut StdRng) -> Self {
         let mut point = |reach: f64| Vec3(std::array::from_fn(|_| rng.random_range(-reach..reach)));
-        let state = SensorState {
-            tool_point_t: point(0.1),
-            workpiece_point_w: point(0.1),
-            length: 0.1,
-            zero: 0.01,
-        };
-        let q: Vec<f64> =
-            (0..machine.commands().len()).map(|c| random_command(machine, c, rng)).collect();
+        let state =
+            SensorState { tool_point_t: point(0.1), workpiece_point_w: point(0.1), length: 0.1, zero: 0.01 };
+        let q: Vec<f64> = (0..machine.commands().len()).map(|c| random_command(machine, c, rng)).collect();
         let tolerance = [2e-5, 2e-5, 2e-5, 5e-5, 5e-5, 5e-5];
-        let deviations: Vec<_> =
-            machine.dyads().iter().map(|_| random_twist(tolerance, size, rng)).collect();
+        let deviations: Vec<_> = machine.dyads().iter().map(|_| random_twist(tolerance, size, rng)).collect();
         // The measured pose lies near the modelled one, exactly on it where every deviation is zero.
         let near = Pose::exp(random_twist(tolerance, size, rng));
         let measured = near * Chain::new(machine, &deviations).w_from_t(&q);
@@ -274,7 +268,8 @@ fn worst(analytic: &DMatrix<f64>, dual: &DMatrix<f64>, width: usize) -> f64 {
     for block in 0..analytic.ncols() / width {
         let columns = block * width..(block + 1) * width;
         let of = |m: &DMatrix<f64>| m.columns_range(columns.clone()).amax();
-        let difference = (analytic.columns_range(columns.clone()) - dual.columns_range(columns.clone())).amax();
+        let difference =
+            (analytic.columns_range(columns.clone()) - dual.columns_range(columns.clone())).amax();
         let size = of(analytic).max(of(dual));
         // A block that is zero in both is right; NaN anywhere must not pass.
         let relative = if difference == 0.0 { 0.0 } else { difference / size };

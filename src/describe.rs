@@ -73,7 +73,7 @@ const SEEN: f64 = 1e-9;
 /// Describes a machine; poses for the ranks come from a fixed seed.
 pub fn describe(machine: &Machine) -> Description {
     let branch = |branch: Branch| {
-        let own = (0..machine.dyads().len()).filter(|j| machine.branch(*j) == branch);
+        let own = (0..machine.dyads().len()).filter(move |j| machine.branch(*j) == branch);
         own.map(|j| &machine.dyads()[j])
     };
     let topology = [Branch::Workpiece, Branch::Tool].map(|b| {
@@ -197,16 +197,18 @@ fn one_kind(machine: &Machine, name: &str, sensor: &Sensor, length: bool) -> Ide
     let samples = (3 * columns).div_ceil(sensor.reading_count());
     let mut rng = StdRng::seed_from_u64(20_260_104);
     let chain = Chain::nominal(machine);
+    // Points off every axis: a ball on the last axis or a bar centre on the first one would see less.
     let state = SensorState {
-        tool_point_t: Vec3([0.0; 3]),
-        workpiece_point_w: Vec3([0.0; 3]),
+        tool_point_t: Vec3([0.031, -0.023, 0.047]),
+        workpiece_point_w: Vec3([0.029, 0.037, -0.017]),
         length: 0.0,
         zero: 0.0,
     };
     let mut rows = Vec::with_capacity(samples * sensor.reading_count() * columns);
     let mut row = vec![0.0; 6 * dyads];
     for _ in 0..samples {
-        let q: Vec<f64> = (0..machine.commands().len()).map(|c| random_command(machine, c, &mut rng)).collect();
+        let q: Vec<f64> =
+            (0..machine.commands().len()).map(|c| random_command(machine, c, &mut rng)).collect();
         let sweep = chain.sweep(&q);
         let rotation: Mat3<f64> = sweep.w_from_t().rotation;
         let (readings, count) = sensor.readings(&sweep, &state, rotation);

@@ -16,7 +16,8 @@ const MOST_BYTES: usize = 8 << 20;
 const MOST_DEPTH: usize = 32;
 
 /// `travel: (0, 1)` instead of `Some((0, 1))`, and `Revolute(axis: "z")` instead of `Revolute((axis: "z"))`.
-pub(crate) const EXTENSIONS: Extensions = Extensions::IMPLICIT_SOME.union(Extensions::UNWRAP_VARIANT_NEWTYPES);
+pub(crate) const EXTENSIONS: Extensions =
+    Extensions::IMPLICIT_SOME.union(Extensions::UNWRAP_VARIANT_NEWTYPES);
 
 /// A text in RON with the name of the file that it came from.
 pub(crate) struct Document {
@@ -110,14 +111,12 @@ impl Document {
 fn explain(code: &ron::Error) -> (String, String) {
     let list = |names: &[&str]| names.join(", ");
     match code {
-        ron::Error::NoSuchStructField { expected, found, .. } => (
-            format!("unknown field `{found}`"),
-            format!("write one of: {}", list(expected)),
-        ),
-        ron::Error::NoSuchEnumVariant { expected, found, .. } => (
-            format!("unknown word `{found}`"),
-            format!("write one of: {}", list(expected)),
-        ),
+        ron::Error::NoSuchStructField { expected, found, .. } => {
+            (format!("unknown field `{found}`"), format!("write one of: {}", list(expected)))
+        }
+        ron::Error::NoSuchEnumVariant { expected, found, .. } => {
+            (format!("unknown word `{found}`"), format!("write one of: {}", list(expected)))
+        }
         ron::Error::MissingStructField { field, outer } => (
             match outer {
                 Some(outer) => format!("field `{field}` of `{outer}` is missing"),

@@ -13,13 +13,14 @@ mod source;
 mod thin;
 mod unknowns;
 
-pub use fit::{BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, Rms, SetupFit, Suspect};
+pub use fit::{
+    BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, Rms, SetupFit, Suspect,
+};
 pub use information::Information;
 pub use loss::Loss;
+pub(crate) use normal::Evaluator;
 pub use solve::{Solver, Stop};
-pub(crate) use fit::measurement_name;
 pub(crate) use source::channel;
-use normal::Evaluator;
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
@@ -31,7 +32,7 @@ use information::Information as Info;
 use normal::{Noise, Normal, Tally};
 use solve::{Problem, Solution};
 use source::Sources;
-use unknowns::{Layout, Role, Unknowns};
+use unknowns::{Layout, Unknowns};
 
 /// How to identify.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +58,11 @@ const NOISE_ROUNDS: usize = 12;
 ///
 /// # Errors
 /// If a recording cannot be read, no joint moves, or there are fewer readings than a fit needs.
-pub fn calibrate(machine: &Machine, recordings: &[Recording], options: Options) -> Result<(CalibratedMachine, Fit)> {
+pub fn calibrate(
+    machine: &Machine,
+    recordings: &[Recording],
+    options: Options,
+) -> Result<(CalibratedMachine, Fit)> {
     calibrate_with_progress(machine, recordings, options, &|_| {})
 }
 
@@ -264,7 +269,9 @@ fn with_stated(sources: &Sources, seen: &[Noise]) -> Vec<Noise> {
         .zip(seen)
         .map(|(source, seen)| match source.recording.header().sigma {
             None => *seen,
-            Some(sigma) if sigma.quantity == Quantity::Angle => Noise { angle: sigma.value.max(seen.angle), ..*seen },
+            Some(sigma) if sigma.quantity == Quantity::Angle => {
+                Noise { angle: sigma.value.max(seen.angle), ..*seen }
+            }
             Some(sigma) => Noise { length: sigma.value.max(seen.length), ..*seen },
         })
         .collect()
@@ -276,7 +283,8 @@ fn enough_to_start(machine: &Machine, sources: &Sources) -> Result<()> {
         .any(|c| sources.all.iter().any(|s| s.summary.moving.get(c).copied().unwrap_or(false)));
     let several = |c: usize| {
         let ranges = sources.all.iter().map(|s| s.summary.commands[c]);
-        let (low, high) = ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (from, to)| (l.min(from), h.max(to)));
+        let (low, high) =
+            ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (from, to)| (l.min(from), h.max(to)));
         high - low > 1e-9
     };
     if sources.samples() < 2 {

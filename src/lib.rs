@@ -1,20 +1,94 @@
-//! Calibrates the geometry of any serial or bifurcated machine.
+//! Calibrates the geometry of any serial or bifurcated machine from recordings, by local products of exponentials.
+//!
+//! # The equation that is solved
+//!
+//! A machine is two lists of dyads from the base outwards, to the workpiece frame `w` and to the tool frame `t`. Each dyad is an
+//! initial pose `M_j` and a joint `exp(xi_j q_j)`; everything that is wrong with the machine is a small twist `dh_j`
+//! between them (`docs/model.md`, (10) and (11)):
+//!
+//! ```text
+//! w_from_t = (Π_workpiece M_j exp(dh_j) exp(xi_j q_j))⁻¹ (Π_tool M_j exp(dh_j) exp(xi_j q_j))
+//!
+//! find dh:   minimise  Σ loss((measured - model(dh, q)) / sigma)  +  ½ Σ (dh / tolerance)²
+//! ```
+//!
+//! Nothing in the code knows a particular machine: machines are RON files ([`machine`], `docs/machines.md`).
+//!
+//! # Map of modules, imports run from the last to the first
+//!
+//! | module | noun |
+//! | --- | --- |
+//! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians; generic over [`Scalar`] |
+//! | [`units`], [`error`] | the borders: units, places, messages with their mend |
+//! | [`machine`] | dyads, joints, RON |
+//! | [`chain`] | poses and Jacobian rows of a machine with given deviations |
+//! | [`sensor`] | what instruments read, and how that depends on every unknown |
+//! | [`check`] | every Jacobian against forward-mode autodiff |
+//! | [`recording`] | CSV recordings, streamed |
+//! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
+//! | [`CalibratedMachine`] | a machine file with its deviations |
+//! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
+//! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
+//! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known |
+//!
+//! # A complete example
+//!
+//! A single linear axis measured by a tracker: declare, simulate an error, calibrate, compare.
+//!
+//! ```
+//! use kincal::identify::{Options, calibrate};
+//! use kincal::recording::Recording;
+//! use kincal::Machine;
+//!
+//! let machine = Machine::parse("slide.ron", r#"Machine(
+//!     name: "slide", units: (length: mm, angle: deg),
+//!     workpiece: [(frame: "w")],
+//!     tool: [(frame: "x", joint: Prismatic(axis: "x", travel: (0, 500))), (frame: "t", at: (0, 0, 80))],
+//! )"#)?;
+//! // The axis runs 40 um low over 400 mm.
+//! let csv = "# measurement: position\n\
+//!            x[mm],px[mm],py[mm],pz[mm]\n\
+//!            0,0.001,0.000,80.000\n\
+//!            100,100.000,0.000,79.990\n\
+//!            200,200.001,0.001,79.980\n\
+//!            300,300.000,0.000,79.971\n\
+//!            400,399.999,0.000,79.960\n";
+//! let recordings = [Recording::from_bytes("slide.csv", csv.as_bytes(), &machine)?];
+//! let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
+//! let rms = fit.rms_m.expect("lengths were measured");
+//! assert!(rms.geometric < 0.1 * rms.nominal);
+//! // It is a pitch of 0.1 mrad.
+//! let pitch = calibrated.deviations().iter().map(|dh| dh.w.0[1]).sum::<f64>();
+//! assert!((pitch - 1e-4).abs() < 3e-5);
+//! # Ok::<(), kincal::Error>(())
+//! ```
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]
 
 mod calibration;
 pub mod chain;
 pub mod check;
+pub mod demo;
+pub mod describe;
 mod document;
 pub mod error;
+pub mod identify;
 pub mod lie;
 pub mod machine;
+pub mod predict;
 pub mod recording;
 mod scalar;
 pub mod sensor;
+pub mod simulate;
 pub mod units;
 
+pub use calibration::CalibratedMachine;
 pub use chain::{Chain, Sweep};
 pub use error::{Error, Place, Result};
 pub use machine::Machine;
 pub use scalar::Scalar;
+
+/// The README's examples run as tests.
+#[doc = include_str!("../README.md")]
+#[cfg(doctest)]
+pub struct ReadmeDoctests;

@@ -98,8 +98,7 @@ impl Unit {
 
     /// All units of one quantity, as they are written, for messages: `m mm um nm in`.
     pub fn symbols_of(quantity: Quantity) -> String {
-        let symbols: Vec<_> =
-            UNITS.iter().filter(|u| u.quantity == quantity).map(|u| u.symbol).collect();
+        let symbols: Vec<_> = UNITS.iter().filter(|u| u.quantity == quantity).map(|u| u.symbol).collect();
         symbols.join(" ")
     }
 

@@ -44,7 +44,13 @@ pub(crate) fn align(machine: &Machine, sources: &Sources, thin: &[Thin], unknown
     start_lengths(machine, sources, thin, unknowns);
 }
 
-fn sights(machine: &Machine, sources: &Sources, thin: &[Thin], unknowns: &Unknowns, setup: usize) -> Vec<Sight> {
+fn sights(
+    machine: &Machine,
+    sources: &Sources,
+    thin: &[Thin],
+    unknowns: &Unknowns,
+    setup: usize,
+) -> Vec<Sight> {
     let chain = unknowns.chain(machine, setup);
     let back = unknowns.setups[setup].pose().inverse();
     let seen = thin.iter().filter(|t| {
@@ -70,7 +76,9 @@ fn align_setup(sources: &Sources, setup: usize, sights: Vec<Sight>, unknowns: &m
             let next = best_frame(sources, &kept, nominal, unknowns);
             let moved = (next.inverse() * m_from_w).log();
             m_from_w = next;
-            if !shift_tool_points(sources, &kept, m_from_w, unknowns) || moved.v.norm() + moved.w.norm() < 1e-7 {
+            if !shift_tool_points(sources, &kept, m_from_w, unknowns)
+                || moved.v.norm() + moved.w.norm() < 1e-7
+            {
                 break;
             }
         }
@@ -144,7 +152,12 @@ fn start_tool_points(sources: &Sources, sights: &[&Sight], unknowns: &mut Unknow
 }
 
 /// Least-squares shift of every unknown tool point for a given frame; whether there was one.
-fn shift_tool_points(sources: &Sources, sights: &[&Sight], m_from_w: Pose<f64>, unknowns: &mut Unknowns) -> bool {
+fn shift_tool_points(
+    sources: &Sources,
+    sights: &[&Sight],
+    m_from_w: Pose<f64>,
+    unknowns: &mut Unknowns,
+) -> bool {
     let mut any = false;
     for index in 0..unknowns.tool_points.len() {
         let own = sights.iter().filter(|s| {
@@ -166,7 +179,12 @@ fn shift_tool_points(sources: &Sources, sights: &[&Sight], m_from_w: Pose<f64>, 
 }
 
 /// The frame that brings measured and modelled points, and measured and modelled directions, together.
-fn best_frame(sources: &Sources, sights: &[&Sight], nominal: Pose<f64>, unknowns: &mut Unknowns) -> Pose<f64> {
+fn best_frame(
+    sources: &Sources,
+    sights: &[&Sight],
+    nominal: Pose<f64>,
+    unknowns: &mut Unknowns,
+) -> Pose<f64> {
     // Pairs: a point in `w` and the same point in the frame that carries `w`.
     let mut pairs: Vec<(Vec3<f64>, Vec3<f64>)> = Vec::new();
     let mut directions: Vec<(Vec3<f64>, Vec3<f64>)> = Vec::new();
@@ -281,7 +299,8 @@ fn trilaterate(
     known_length: Option<f64>,
 ) -> Option<(Vec3<f64>, Option<f64>)> {
     let columns = if known_length.is_some() { 4 } else { 5 };
-    let middle = sights.iter().fold(Vec3([0.0; 3]), |sum, s| sum + modelled(s)).times(1.0 / sights.len() as f64);
+    let middle =
+        sights.iter().fold(Vec3([0.0; 3]), |sum, s| sum + modelled(s)).times(1.0 / sights.len() as f64);
     let mut matrix = DMatrix::zeros(sights.len(), columns);
     let mut right = DVector::zeros(sights.len());
     for (k, sight) in sights.iter().enumerate() {

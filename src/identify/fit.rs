@@ -36,10 +36,7 @@ impl Rms {
             let sum: f64 = own.iter().map(|t| pick(t).0).sum();
             (samples > 0).then(|| (sum / samples as f64).sqrt())
         };
-        Rms {
-            m: mean(|t| (t.length2, t.length_weight)),
-            rad: mean(|t| (t.angle2, t.angle_weight)),
-        }
+        Rms { m: mean(|t| (t.length2, t.length_weight)), rad: mean(|t| (t.angle2, t.angle_weight)) }
     }
 }
 
@@ -209,9 +206,8 @@ pub(super) fn report(
     let (machine, sources, layout) = (problem.machine, problem.sources, problem.layout);
     let tallies = &found.solution.normal.tallies;
     let (before, after) = (Rms::over(nominal), Rms::over(tallies));
-    let pair = |before: Option<f64>, after: Option<f64>| {
-        Some(BeforeAfter { nominal: before?, geometric: after? })
-    };
+    let pair =
+        |before: Option<f64>, after: Option<f64>| Some(BeforeAfter { nominal: before?, geometric: after? });
     let recordings = (sources.all.iter().enumerate())
         .map(|(i, source)| {
             let angle = source.quantity(machine, 0) == Quantity::Angle;
@@ -229,8 +225,7 @@ pub(super) fn report(
             }
         })
         .collect();
-    let readings: u64 =
-        sources.all.iter().map(|s| s.summary.samples * s.sensor.reading_count() as u64).sum();
+    let readings: u64 = sources.all.iter().map(|s| s.summary.samples * s.sensor.reading_count() as u64).sum();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
     let rank_in_general = Information::new(&general, layout, problem.prior).rank;
     let suspects = suspects(problem, found)?;

@@ -79,8 +79,9 @@ impl Information {
                 }
             }
         }
-        let used = strength.iter().map(|s| if prior { s / (1.0 + s) } else { f64::from(*s > 0.0) }).sum::<f64>()
-            + (rest.len() as f64);
+        let used =
+            strength.iter().map(|s| if prior { s / (1.0 + s) } else { f64::from(*s > 0.0) }).sum::<f64>()
+                + (rest.len() as f64);
         let open = open_directions(&outer, &cross, &inner, &rest, layout.len, floor);
         let used = used - open.len() as f64;
         Information { rank, directions, strength, positions, variance, open, used }

@@ -117,7 +117,9 @@ impl<'a> Evaluator<'a> {
         }
         self.chain.sweep_into(q, sweep);
         let rotation = match self.sensor {
-            Sensor::Pose => Pose::exp(Twist::from_array([0.0, 0.0, 0.0, measured[3], measured[4], measured[5]])).rotation,
+            Sensor::Pose => {
+                Pose::exp(Twist::from_array([0.0, 0.0, 0.0, measured[3], measured[4], measured[5]])).rotation
+            }
             _ => Mat3::identity(0.0),
         };
         let (readings, count) = self.sensor.readings(sweep, &self.state, rotation);

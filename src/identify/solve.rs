@@ -114,14 +114,18 @@ impl Problem<'_> {
     }
 
     /// Matrix and gradient of the free parameters scaled by `scales`, prior included.
-    fn scaled(&self, normal: &Normal, unknowns: &Unknowns, scales: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    fn scaled(
+        &self,
+        normal: &Normal,
+        unknowns: &Unknowns,
+        scales: &DVector<f64>,
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let free: Vec<usize> = (0..self.layout.len).filter(|i| self.free[*i]).collect();
         let has_prior = self.layout.mask(|b| b.prior && self.prior);
         let pulls = self.pulls(unknowns);
-        let mut matrix =
-            DMatrix::from_fn(free.len(), free.len(), |a, b| {
-                normal.matrix[(free[a], free[b])] * scales[free[a]] * scales[free[b]]
-            });
+        let mut matrix = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+            normal.matrix[(free[a], free[b])] * scales[free[a]] * scales[free[b]]
+        });
         let mut gradient = DVector::from_fn(free.len(), |a, _| normal.gradient[free[a]] * scales[free[a]]);
         for (a, i) in free.iter().enumerate() {
             if has_prior[*i] {

@@ -45,7 +45,12 @@ pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
 }
 
 /// Robust noise of each source from the median of its residuals; sources of one kind share it.
-pub(crate) fn robust_noise(machine: &Machine, sources: &Sources, thin: &[Thin], unknowns: &Unknowns) -> Vec<Noise> {
+pub(crate) fn robust_noise(
+    machine: &Machine,
+    sources: &Sources,
+    thin: &[Thin],
+    unknowns: &Unknowns,
+) -> Vec<Noise> {
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let kinds: Vec<_> = sources.all.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
     let mut sizes: Vec<[Vec<f64>; 2]> = sources.all.iter().map(|_| Default::default()).collect();

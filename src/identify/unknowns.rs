@@ -64,9 +64,11 @@ impl Layout {
         }
         for i in 0..sources.zeros.len() {
             let own = |s: &&Source| s.zero == Known::Unknown(i);
-            let angular = sources.all.iter().find(own).is_some_and(|s| {
-                s.quantity(machine, 0) == crate::units::Quantity::Angle
-            });
+            let angular = sources
+                .all
+                .iter()
+                .find(own)
+                .is_some_and(|s| s.quantity(machine, 0) == crate::units::Quantity::Angle);
             let (translation, rotation) = free(machine.t_index());
             layout.push(Role::Zero(i), 1, [if angular { rotation } else { translation }; 6], false);
         }

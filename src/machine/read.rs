@@ -78,18 +78,27 @@ impl Machine {
             let path = self.path_of(j);
             if !frames.insert(dyad.frame.as_str()) {
                 let name = dyad.frame.clone();
-                return Err((format!("{path}.frame"), MachineFault::NameTwice { what: "frame".into(), name }));
+                return Err((
+                    format!("{path}.frame"),
+                    MachineFault::NameTwice { what: "frame".into(), name },
+                ));
             }
             usable_name(&format!("{path}.frame"), "frame", &dyad.frame)?;
             check_dyad(dyad, &path, self.units)?;
             let Some(joint) = &dyad.joint else { continue };
             if !joints.insert(joint.name.as_str()) {
                 let name = joint.name.clone();
-                return Err((format!("{path}.joint.name"), MachineFault::NameTwice { what: "joint".into(), name }));
+                return Err((
+                    format!("{path}.joint.name"),
+                    MachineFault::NameTwice { what: "joint".into(), name },
+                ));
             }
             if joint.name == "t" || joint.name == "w" {
                 let name = joint.name.clone();
-                return Err((format!("{path}.joint.name"), MachineFault::BadName { what: "joint".into(), name }));
+                return Err((
+                    format!("{path}.joint.name"),
+                    MachineFault::BadName { what: "joint".into(), name },
+                ));
             }
         }
         if joints.is_empty() {
@@ -134,7 +143,10 @@ impl Machine {
             for (leader, factor) in joint.follows.as_ref().unwrap_or(&own) {
                 let path = format!("{}.joint.follows.{leader}", self.path_of(j));
                 if !(factor.is_finite() && factor.abs() < LARGEST) {
-                    return Err((path, MachineFault::NotFinite { what: "a factor of `follows`".into(), value: *factor }));
+                    return Err((
+                        path,
+                        MachineFault::NotFinite { what: "a factor of `follows`".into(), value: *factor },
+                    ));
                 }
                 let Some(index) = commands.iter().position(|c| c == leader) else {
                     let fault = MachineFault::Leader {
@@ -274,7 +286,10 @@ fn joint(form: &JointForm, frame: &str, units: FileUnits, path: &str) -> Checked
         number(format!("{path}.joint.travel[0]"), from, "a limit of `travel`")?;
         number(format!("{path}.joint.travel[1]"), to, "a limit of `travel`")?;
         if from >= to {
-            return Err((format!("{path}.joint.travel"), MachineFault::TravelReversed { joint: name, from, to }));
+            return Err((
+                format!("{path}.joint.travel"),
+                MachineFault::TravelReversed { joint: name, from, to },
+            ));
         }
     }
     let nc = body.nc.as_ref().map(|nc| NcWord { address: nc.address.clone(), sign: nc.sign });

@@ -1,0 +1,63 @@
+//! The command line of kincal. No mathematics here: every command is one library call.
+
+mod calibrate;
+mod check;
+mod demo;
+mod describe;
+mod output;
+mod predict;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Calibrates the geometry of any serial or bifurcated machine.
+#[derive(Parser)]
+#[command(version, about, arg_required_else_help = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Topology, model equation, parameters, and what each instrument can identify
+    Describe(describe::Args),
+    /// Every Jacobian of this machine against forward-mode autodiff
+    Check(check::Args),
+    /// Identifies the deviations of a machine from recordings
+    Calibrate(calibrate::Args),
+    /// What a calibrated machine says the instrument would read, sample by sample
+    Predict(predict::Args),
+    /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
+    Demo(demo::Args),
+}
+
+/// What is common to all commands.
+#[derive(clap::Args, Clone)]
+pub(crate) struct Common {
+    /// Machine-readable result, into a file or `-` for standard output
+    #[arg(long, value_name = "FILE|-")]
+    json: Option<String>,
+    /// Nothing on standard output but what was asked for
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Runs the command line: 0 done, 1 input at fault, 2 usage.
+pub(crate) fn run() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Describe(args) => describe::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Calibrate(args) => calibrate::run(&args),
+        Command::Predict(args) => predict::run(&args),
+        Command::Demo(args) => demo::run(&args),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::complain(&failure);
+            ExitCode::from(1)
+        }
+    }
+}

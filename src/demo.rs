@@ -1,0 +1,52 @@
+//! The demonstration: the reference machine, a simulated ballbar recording of its errors, and the calibration that finds them.
+
+use crate::calibration::CalibratedMachine;
+use crate::error::{Error, Result};
+use crate::identify::{Fit, Options, calibrate};
+use crate::lie::Twist;
+use crate::machine::Machine;
+use crate::recording::Recording;
+use crate::sensor::Sensor;
+use crate::simulate::{Instrument, cone, random_deviations, recording};
+
+/// The reference machine's file.
+pub const REFERENCE: &str = include_str!("../machines/ac_table_tilting.ron");
+/// Length of the bar, m.
+const BAR: f64 = 0.1;
+/// Noise of the ballbar, m.
+const NOISE: f64 = 5e-7;
+
+/// What the demonstration has to show.
+#[derive(Debug)]
+pub struct Demo {
+    /// The machine with the errors that were put in.
+    pub truth: CalibratedMachine,
+    /// Cone frustum (BK4), as a recording file would have it.
+    pub recording: String,
+    /// The calibrated machine.
+    pub calibrated: CalibratedMachine,
+    /// What the identification says.
+    pub fit: Fit,
+}
+
+/// Runs it; the same seed gives the same figures.
+///
+/// # Errors
+/// None that a user could cause: everything is embedded.
+pub fn demo(seed: u64) -> Result<Demo> {
+    let machine = Machine::parse("ac_table_tilting.ron", REFERENCE)?;
+    let mut deviations = random_deviations(&machine, 1.0, seed);
+    deviations[machine.w_index()] = Twist::zero(0.0);
+    let truth = CalibratedMachine::nominal(machine.clone()).with_deviations(deviations);
+    let path = cone(&machine, BAR, 900).ok_or_else(|| Error::Undetermined {
+        what: "the reference machine does not reach the cone".into(),
+        mend: String::new(),
+    })?;
+    let mut instrument = Instrument::new(Sensor::Distance { absolute: false }, NOISE, 0.0);
+    instrument.state.length = BAR;
+    let header = [format!("nominal_length[m]: {BAR}")];
+    let text = recording(&truth, &instrument, &path, &header, seed);
+    let recordings = [Recording::from_bytes("demo_bk4.csv", text.clone().into_bytes(), &machine)?];
+    let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
+    Ok(Demo { truth, recording: text, calibrated, fit })
+}

@@ -1,0 +1,268 @@
+//! What a calibrated machine says an instrument would read, sample by sample.
+
+use std::io::Write;
+
+use serde::Serialize;
+
+use crate::calibration::CalibratedMachine;
+use crate::chain::Chain;
+use crate::error::{Error, Result};
+use crate::identify::{Evaluator, channel};
+use crate::lie::{Pose, Twist, Vec3};
+use crate::machine::{JointKind, Machine};
+use crate::recording::{Header, NominalLength, Recording, Role, Sample, ToolPoint};
+use crate::sensor::{Sensor, SensorState};
+use crate::units::Unit;
+
+/// Residuals of a recording under a model, SI. Angles stand beside or instead of lengths.
+#[derive(Clone, Debug, Serialize)]
+pub struct Prediction {
+    /// Samples predicted.
+    pub samples: u64,
+    /// Rows left out because a number was missing.
+    pub dropped: u64,
+    /// Root mean square of the residual's norm, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_m: Option<f64>,
+    /// Largest norm, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_m: Option<f64>,
+    /// Mean, m: signed for scalars, of the norm for vectors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_m: Option<f64>,
+    /// Root mean square of the rotation residual, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_rad: Option<f64>,
+    /// Largest rotation residual, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_rad: Option<f64>,
+    /// Mean rotation residual, rad; signed for scalars.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_rad: Option<f64>,
+    /// Samples at which a joint leaves the range that the calibration has seen.
+    pub extrapolated_samples: u64,
+}
+
+/// Sums over residual norms of one kind.
+#[derive(Default)]
+struct Sums {
+    count: u64,
+    squares: f64,
+    largest: f64,
+    total: f64,
+}
+
+impl Sums {
+    fn add(&mut self, residual: &[f64]) {
+        let norm = residual.iter().map(|r| r * r).sum::<f64>().sqrt();
+        self.count += 1;
+        self.squares += norm * norm;
+        self.largest = self.largest.max(norm);
+        self.total += if let [scalar] = residual { *scalar } else { norm };
+    }
+
+    fn figures(&self) -> [Option<f64>; 3] {
+        let n = self.count as f64;
+        let some = |x: f64| (self.count > 0).then_some(x);
+        [some((self.squares / n).sqrt()), some(self.largest), some(self.total / n)]
+    }
+}
+
+/// Model and residual of every sample of a recording; each row goes to `out` as CSV if one is given.
+///
+/// A row has the input's columns as they were, then for each measured column `NAME_model[unit]` and `NAME_residual[unit]`
+/// (measured minus model). A drop-out keeps its row, with empty model cells where a command is missing.
+///
+/// # Errors
+/// If the recording cannot be read, or belongs to a set-up that the calibration does not know ([`crate::identify::fit_setup`]
+/// finds it).
+pub fn predict(
+    calibrated: &CalibratedMachine,
+    recording: &Recording,
+    mut out: Option<&mut dyn Write>,
+) -> Result<Prediction> {
+    let machine = calibrated.machine();
+    let header = recording.header();
+    let sensor = Sensor::of(header);
+    let state = sensor_state(calibrated, header, &sensor)?;
+    let evaluator = Evaluator {
+        machine,
+        chain: chain(calibrated, header, &sensor)?,
+        state,
+        sensor: &sensor,
+        dh: calibrated.deviations(),
+    };
+    let columns = measured_columns(recording);
+    let failed = |e| Error::file(recording.path(), e);
+    if let Some(out) = &mut out {
+        write_head(*out, recording, &columns).map_err(failed)?;
+    }
+    let mut sweep = evaluator.workspace();
+    let (mut lengths, mut angles) = (Sums::default(), Sums::default());
+    let (mut dropped, mut extrapolated) = (0, 0);
+    for row in recording.rows()? {
+        let row = row?;
+        let mut tail = ",".repeat(2 * columns.len());
+        match &row.sample {
+            None => dropped += 1,
+            Some(sample) => {
+                extrapolated += u64::from(calibrated.extrapolates(&sample.commands));
+                let residuals = evaluator.residuals(&sample.commands, &sample.values, &mut sweep, None);
+                match &sensor {
+                    Sensor::Pose => {
+                        lengths.add(&residuals[..3]);
+                        angles.add(&residuals[3..6]);
+                    }
+                    Sensor::Joint { dyad } if is_revolute(machine, *dyad) => angles.add(&residuals[..1]),
+                    _ => lengths.add(&residuals[..sensor.reading_count()]),
+                }
+                if out.is_some() {
+                    tail = cells(&columns, sample, &residuals[..sensor.reading_count()], &sensor);
+                }
+            }
+        }
+        if let Some(out) = &mut out {
+            writeln!(out, "{}{tail}", row.text).map_err(failed)?;
+        }
+    }
+    let ([rms_m, max_m, mean_m], [rms_rad, max_rad, mean_rad]) = (lengths.figures(), angles.figures());
+    let samples = lengths.count.max(angles.count);
+    Ok(Prediction {
+        samples,
+        dropped,
+        rms_m,
+        max_m,
+        mean_m,
+        rms_rad,
+        max_rad,
+        mean_rad,
+        extrapolated_samples: extrapolated,
+    })
+}
+
+fn is_revolute(machine: &Machine, dyad: usize) -> bool {
+    machine.dyads()[dyad].joint.as_ref().is_some_and(|j| j.kind == JointKind::Revolute)
+}
+
+/// The chain of the recording's set-up.
+fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Result<Chain<f64>> {
+    match calibrated.chain_of_setup(&header.setup) {
+        Some(chain) => Ok(chain),
+        None if header.workpiece_frame_unknown && !matches!(sensor, Sensor::Joint { .. }) => {
+            let known: Vec<&str> = calibrated.setup_names().collect();
+            Err(missing(
+                format!("where set-up \"{}\" stands is not in the calibrated file", header.setup),
+                &known,
+            ))
+        }
+        None => Ok(calibrated.chain()),
+    }
+}
+
+fn missing(what: String, known: &[&str]) -> Error {
+    let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
+    Error::Undetermined {
+        what,
+        mend: format!("add --fit-setup to find it from this recording; the file knows: {known}"),
+    }
+}
+
+fn sensor_state(
+    calibrated: &CalibratedMachine,
+    header: &Header,
+    sensor: &Sensor,
+) -> Result<SensorState<f64>> {
+    let tool_point_t = match &header.tool_point {
+        ToolPoint::Known(point) => *point,
+        ToolPoint::Unknown(name) => {
+            let found = calibrated.tool_points.iter().find(|(known, _)| known == name);
+            let known: Vec<&str> = calibrated.tool_points.iter().map(|(n, _)| n.as_str()).collect();
+            found
+                .ok_or_else(|| {
+                    missing(format!("tool point \"{name}\" is not in the calibrated file"), &known)
+                })?
+                .1
+        }
+    };
+    let length = match header.nominal_length {
+        NominalLength::Known(length) => length,
+        NominalLength::NotGiven => 0.0,
+        NominalLength::Unknown => {
+            let found = calibrated.lengths.iter().find(|(setup, _)| *setup == header.setup);
+            found
+                .ok_or_else(|| {
+                    missing("the nominal length of this set-up is not in the calibrated file".into(), &[])
+                })?
+                .1
+        }
+    };
+    let mut zero = 0.0;
+    if header.zero_unknown && sensor.has_zero() {
+        let channel = channel(sensor, calibrated.machine());
+        let found = calibrated.zeros.iter().find(|(setup, of, _)| *setup == header.setup && *of == channel);
+        zero = found
+            .ok_or_else(|| {
+                missing(format!("the zero of {channel} in this set-up is not in the calibrated file"), &[])
+            })?
+            .2;
+    }
+    Ok(SensorState { tool_point_t, workpiece_point_w: header.workpiece_point, length, zero })
+}
+
+/// A measured column: its name and unit as written.
+struct Measured {
+    name: String,
+    unit: Unit,
+}
+
+fn measured_columns(recording: &Recording) -> Vec<Measured> {
+    let measured = recording.columns().iter().filter(|c| matches!(c.role, Role::Value(_)));
+    let mut columns: Vec<_> = measured.collect();
+    columns.sort_by_key(|c| match c.role {
+        Role::Value(i) => i,
+        _ => usize::MAX,
+    });
+    columns.into_iter().map(|c| Measured { name: c.name.clone(), unit: c.unit }).collect()
+}
+
+fn write_head(out: &mut dyn Write, recording: &Recording, columns: &[Measured]) -> std::io::Result<()> {
+    write!(out, "{}", recording.preamble().trim_end_matches(['\r', '\n']))?;
+    for Measured { name, unit } in columns {
+        write!(out, ",{name}_model[{unit}],{name}_residual[{unit}]")?;
+    }
+    writeln!(out)
+}
+
+/// `,model,residual` of every measured column.
+fn cells(columns: &[Measured], sample: &Sample, residuals: &[f64], sensor: &Sensor) -> String {
+    let mut text = String::new();
+    let mut put = |unit: Unit, model: f64, residual: f64| {
+        text.push_str(&format!(",{:.12e},{:.6e}", unit.from_si(model), unit.from_si(residual)));
+    };
+    let position = residuals.len().min(3);
+    for i in 0..position {
+        put(columns[i].unit, sample.values[i] - residuals[i], residuals[i]);
+    }
+    if !matches!(sensor, Sensor::Pose) {
+        return text;
+    }
+    // R_model = exp(φ)⁻¹ R_measured; the columns say it in the form in which it was measured.
+    let turn = |x: &[f64]| Pose::exp(Twist::new(Vec3([0.0; 3]), Vec3([x[0], x[1], x[2]])));
+    let model = turn(&residuals[3..6]).inverse() * turn(&sample.values[3..6]);
+    if columns.len() == 7 {
+        let q = |pose: Pose<f64>| {
+            let q = pose.to_isometry().rotation;
+            [q.w, q.i, q.j, q.k]
+        };
+        let (model, measured) = (q(model), q(turn(&sample.values[3..6])));
+        for i in 0..4 {
+            put(columns[3 + i].unit, model[i], measured[i] - model[i]);
+        }
+    } else {
+        let vector = model.rotation_vector();
+        for i in 0..3 {
+            put(columns[3 + i].unit, vector.0[i], residuals[3 + i]);
+        }
+    }
+    text
+}

@@ -1,0 +1,37 @@
+//! What several tests need.
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+
+use kincal::Machine;
+
+/// Every shipped machine with the stem of its file, sorted.
+pub fn machines() -> Vec<(String, Machine)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("machines");
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder).expect("machines/ is there").map(|e| e.expect("readable").path()).collect();
+    files.sort();
+    files
+        .into_iter()
+        .filter(|f| f.extension().is_some_and(|e| e == "ron"))
+        .map(|file| {
+            let stem = file.file_stem().expect("a name").to_string_lossy().into_owned();
+            (stem, Machine::open(&file).unwrap_or_else(|e| panic!("{e}")))
+        })
+        .collect()
+}
+
+/// One shipped machine.
+pub fn machine(stem: &str) -> Machine {
+    machines().into_iter().find(|(name, _)| name == stem).unwrap_or_else(|| panic!("{stem} is shipped")).1
+}
+
+/// A file of the folder beside the project; `None`, with a message, where it is missing.
+pub fn shared(path: &str) -> Option<PathBuf> {
+    let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
+    if full.exists() {
+        return Some(full);
+    }
+    println!("skipped: ../shared/{path} is not here");
+    None
+}
