@@ -173,7 +173,7 @@ impl MachineFault {
             AxisWord { .. } => {
                 "write one of \"x\" \"-x\" \"y\" \"-y\" \"z\" \"-z\", or a unit vector (0, 0.6, 0.8)".into()
             }
-            NotFinite { .. } => "write a finite number below 1e9".into(),
+            NotFinite { .. } => "write a plain number; nothing on a machine is larger than 1e9 m or 1e9 rad".into(),
             TravelReversed { .. } => "write the lower limit first: travel: (lower, upper)".into(),
             Tolerance { .. } => "write a positive number: how far off you expect such a value to be".into(),
             Mass { .. } => "write a mass of zero or more, in kg".into(),

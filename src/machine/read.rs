@@ -178,20 +178,41 @@ fn vec3((x, y, z): Triple) -> Vec3<f64> {
     Vec3([x, y, z])
 }
 
-fn finite(path: &str, (x, y, z): Triple, what: &str) -> Checked<()> {
-    for (i, value) in [x, y, z].into_iter().enumerate() {
-        if !(value.is_finite() && value.abs() < LARGEST) {
-            return Err((format!("{path}[{i}]"), MachineFault::NotFinite { what: what.into(), value }));
-        }
-    }
-    Ok(())
-}
-
+/// A pure number, or one in SI.
 fn number(path: String, value: f64, what: &str) -> Checked<f64> {
     if value.is_finite() && value.abs() < LARGEST {
         return Ok(value);
     }
     Err((path, MachineFault::NotFinite { what: what.into(), value }))
+}
+
+fn finite(path: &str, (x, y, z): Triple, what: &str) -> Checked<()> {
+    for (i, value) in [x, y, z].into_iter().enumerate() {
+        number(format!("{path}[{i}]"), value, what)?;
+    }
+    Ok(())
+}
+
+/// A number of the file in SI; what is too large is told as it was written.
+fn to_si(path: String, value: f64, unit: Unit, what: &str) -> Checked<f64> {
+    let si = unit.to_si(value);
+    if si.is_finite() && si.abs() < LARGEST {
+        return Ok(si);
+    }
+    Err((path, MachineFault::NotFinite { what: what.into(), value }))
+}
+
+fn vec_to_si(path: &str, (x, y, z): Triple, unit: Unit, what: &str) -> Checked<Vec3<f64>> {
+    let component = |i: usize, value| to_si(format!("{path}[{i}]"), value, unit, what);
+    Ok(Vec3([component(0, x)?, component(1, y)?, component(2, z)?]))
+}
+
+/// The nearest number that a file can say in `unit`, without the dust of rounding: 1e-15 m or rad at most.
+fn sayable(si: f64, unit: Unit) -> f64 {
+    let places = 1e15 / 10f64.powf(unit.from_si(1.0).log10().ceil());
+    let written = (unit.from_si(si) * places).round() / places;
+    // Adding zero turns -0 into 0.
+    unit.to_si(written) + 0.0
 }
 
 fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
@@ -214,8 +235,8 @@ fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
         (None, None) => None,
         (mass, centre) => {
             let centre = centre.unwrap_or_default();
-            finite(&format!("{path}.centre_of_mass"), centre, "centre of mass")?;
-            let centre = Vec3(vec3(centre).0.map(|c| units.length.to_si(c)));
+            let path = format!("{path}.centre_of_mass");
+            let centre = vec_to_si(&path, centre, units.length, "a coordinate of `centre_of_mass`")?;
             Some(MassPoint { mass: mass.unwrap_or(0.0), centre })
         }
     };
@@ -231,11 +252,14 @@ fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
 fn placement(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Placement> {
     let Some(moves) = &form.moves else {
         let (at, rotation) = (form.at.unwrap_or_default(), form.rotation.unwrap_or_default());
-        finite(&format!("{path}.at"), at, "a coordinate of `at`")?;
-        finite(&format!("{path}.rotation"), rotation, "a component of `rotation`")?;
         return Ok(Placement {
-            at: Vec3(vec3(at).0.map(|c| units.length.to_si(c))),
-            rotation: Vec3(vec3(rotation).0.map(|c| units.angle.to_si(c))),
+            at: vec_to_si(&format!("{path}.at"), at, units.length, "a coordinate of `at`")?,
+            rotation: vec_to_si(
+                &format!("{path}.rotation"),
+                rotation,
+                units.angle,
+                "a component of `rotation`",
+            )?,
         });
     };
     if form.at.is_some() || form.rotation.is_some() {
@@ -251,16 +275,21 @@ fn placement(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Placement
             MoveForm::Ry(value) => (1, value, true),
             MoveForm::Rz(value) => (2, value, true),
         };
-        number(format!("{path}.moves[{i}]"), value, "a move")?;
+        let unit = if turns { units.angle } else { units.length };
+        let value = to_si(format!("{path}.moves[{i}]"), value, unit, "a move")?;
         let axis = Vec3(std::array::from_fn(|k| if k == along { 1.0 } else { 0.0 }));
         pose = pose
             * if turns {
-                Pose::turn(axis, units.angle.to_si(value))
+                Pose::turn(axis, value)
             } else {
-                Pose::translation(axis.times(units.length.to_si(value)))
+                Pose::translation(axis.times(value))
             };
     }
-    Ok(pose.into())
+    let Placement { at, rotation } = pose.into();
+    Ok(Placement {
+        at: Vec3(at.0.map(|c| sayable(c, units.length))),
+        rotation: Vec3(rotation.0.map(|c| sayable(c, units.angle))),
+    })
 }
 
 fn joint(form: &JointForm, frame: &str, units: FileUnits, path: &str) -> Checked<Joint> {
@@ -271,8 +300,8 @@ fn joint(form: &JointForm, frame: &str, units: FileUnits, path: &str) -> Checked
     let name = body.name.clone().unwrap_or_else(|| frame.to_string());
     let axis = axis(body, &name, &format!("{path}.joint.axis"))?;
     if let Some((from, to)) = body.travel {
-        number(format!("{path}.joint.travel[0]"), from, "a limit of `travel`")?;
-        number(format!("{path}.joint.travel[1]"), to, "a limit of `travel`")?;
+        to_si(format!("{path}.joint.travel[0]"), from, unit, "a limit of `travel`")?;
+        to_si(format!("{path}.joint.travel[1]"), to, unit, "a limit of `travel`")?;
         if from >= to {
             return Err((format!("{path}.joint.travel"), MachineFault::TravelReversed { joint: name, from, to }));
         }
