@@ -61,7 +61,7 @@ impl Machine {
             machine = machine.with_gravity(vec3(gravity))?;
         }
         if let Some(form) = form.tolerance {
-            machine = machine.with_tolerance(tolerance(form, units))?;
+            machine = machine.with_tolerance(tolerance(form, units, "tolerance")?)?;
         }
         Ok(machine)
     }
@@ -129,6 +129,10 @@ impl Machine {
             self.joints().filter(|(_, j)| commanded(j)).map(|(_, j)| j.name.clone()).collect();
         let mut drives = vec![None; self.dyads.len()];
         for (j, joint) in self.joints() {
+            if joint.follows.as_ref().is_some_and(|leaders| leaders.is_empty()) {
+                let fault = MachineFault::FollowsNothing { joint: joint.name.clone() };
+                return Err((format!("{}.joint.follows", self.path_of(j)), fault));
+            }
             let own = [(joint.name.clone(), 1.0)].into();
             let mut terms = Vec::new();
             for (leader, factor) in joint.follows.as_ref().unwrap_or(&own) {
@@ -223,21 +227,32 @@ fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
     Err((path.into(), MachineFault::BadName { what: what.into(), name: name.into() }))
 }
 
-fn tolerance(form: ToleranceForm, units: FileUnits) -> Tolerance {
-    Tolerance {
-        translation: units.length.to_si(form.translation),
-        rotation: units.angle.to_si(form.rotation),
-    }
+fn tolerance(form: ToleranceForm, units: FileUnits, path: &str) -> Checked<Tolerance> {
+    let component = |what: &str, value: f64, unit: Unit| {
+        let si = unit.to_si(value);
+        if si.is_finite() && si > 0.0 {
+            return Ok(si);
+        }
+        Err((format!("{path}.{what}"), MachineFault::Tolerance { what: what.into(), value }))
+    };
+    Ok(Tolerance {
+        translation: component("translation", form.translation, units.length)?,
+        rotation: component("rotation", form.rotation, units.angle)?,
+    })
 }
 
 fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
     let mass = match (form.mass, form.centre_of_mass) {
         (None, None) => None,
-        (mass, centre) => {
+        (None, Some(_)) => {
+            let fault = MachineFault::CentreWithoutMass { frame: form.frame.clone() };
+            return Err((format!("{path}.centre_of_mass"), fault));
+        }
+        (Some(mass), centre) => {
             let centre = centre.unwrap_or_default();
             let path = format!("{path}.centre_of_mass");
             let centre = vec_to_si(&path, centre, units.length, "a coordinate of `centre_of_mass`")?;
-            Some(MassPoint { mass: mass.unwrap_or(0.0), centre })
+            Some(MassPoint { mass, centre })
         }
     };
     Ok(Dyad {
@@ -245,7 +260,9 @@ fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
         placement: placement(form, units, path)?,
         joint: form.joint.as_ref().map(|j| joint(j, &form.frame, units, path)).transpose()?,
         mass,
-        tolerance: form.tolerance.map(|t| tolerance(t, units)),
+        tolerance: (form.tolerance)
+            .map(|t| tolerance(t, units, &format!("{path}.tolerance")))
+            .transpose()?,
     })
 }
 
@@ -367,9 +384,16 @@ fn check_dyad(dyad: &Dyad, path: &str, units: FileUnits) -> Checked<()> {
     {
         return Err((format!("{path}.mass"), MachineFault::Mass { frame: dyad.frame.clone(), value: mass }));
     }
+    if let Some(MassPoint { centre: Vec3([x, y, z]), .. }) = dyad.mass {
+        finite(&format!("{path}.centre_of_mass"), (x, y, z), "a coordinate of `centre_of_mass`")?;
+    }
     let Some(joint) = &dyad.joint else { return Ok(()) };
     usable_name(&format!("{path}.joint.name"), "joint", &joint.name)?;
     unit_axis(joint.axis, &joint.name, &format!("{path}.joint.axis"))?;
+    if let Some((from, to)) = joint.travel {
+        number(format!("{path}.joint.travel[0]"), from, "a limit of `travel`")?;
+        number(format!("{path}.joint.travel[1]"), to, "a limit of `travel`")?;
+    }
     if let Some((from, to)) = joint.travel.filter(|(from, to)| from >= to) {
         let unit = match joint.kind {
             JointKind::Prismatic => units.length,
