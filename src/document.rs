@@ -16,7 +16,8 @@ const MOST_BYTES: usize = 8 << 20;
 const MOST_DEPTH: usize = 32;
 
 /// `travel: (0, 1)` instead of `Some((0, 1))`, and `Revolute(axis: "z")` instead of `Revolute((axis: "z"))`.
-pub(crate) const EXTENSIONS: Extensions = Extensions::IMPLICIT_SOME.union(Extensions::UNWRAP_VARIANT_NEWTYPES);
+pub(crate) const EXTENSIONS: Extensions =
+    Extensions::IMPLICIT_SOME.union(Extensions::UNWRAP_VARIANT_NEWTYPES);
 
 /// A text in RON with the name of the file that it came from.
 pub(crate) struct Document {
@@ -90,7 +91,8 @@ impl Document {
     /// Whether RON's reader stopped because nothing more came, whatever it was waiting for.
     fn at_end(&self, line: usize, column: usize, code: &ron::Error) -> bool {
         use ron::Error::{DuplicateStructField, MissingStructField, TrailingCharacters};
-        let told = matches!(code, MissingStructField { .. } | DuplicateStructField { .. } | TrailingCharacters);
+        let told =
+            matches!(code, MissingStructField { .. } | DuplicateStructField { .. } | TrailingCharacters);
         !told && (line, column) >= line_and_column(&self.text, self.text.trim_end().len())
     }
 
@@ -124,14 +126,12 @@ const NOT_RON: &str = "docs/machines.md shows the form of a machine file";
 fn explain(code: &ron::Error) -> (String, String) {
     let list = |names: &[&str]| names.join(", ");
     match code {
-        ron::Error::NoSuchStructField { expected, found, .. } => (
-            format!("unknown field `{found}`"),
-            format!("write one of: {}", list(expected)),
-        ),
-        ron::Error::NoSuchEnumVariant { expected, found, .. } => (
-            format!("unknown word `{found}`"),
-            format!("write one of: {}", list(expected)),
-        ),
+        ron::Error::NoSuchStructField { expected, found, .. } => {
+            (format!("unknown field `{found}`"), format!("write one of: {}", list(expected)))
+        }
+        ron::Error::NoSuchEnumVariant { expected, found, .. } => {
+            (format!("unknown word `{found}`"), format!("write one of: {}", list(expected)))
+        }
         ron::Error::MissingStructField { field, outer } => (
             match outer {
                 Some(outer) => format!("field `{field}` of `{outer}` is missing"),
@@ -148,9 +148,13 @@ fn explain(code: &ron::Error) -> (String, String) {
         ron::Error::ExpectedMapColon => {
             ("expected a colon".into(), "write a field as name: value, with a colon between".into())
         }
-        ron::Error::ExpectedFloat => ("expected a number".into(), "write a plain number, such as 158.5".into()),
+        ron::Error::ExpectedFloat => {
+            ("expected a number".into(), "write a plain number, such as 158.5".into())
+        }
         ron::Error::ExpectedInteger => ("expected a whole number".into(), "write 1 or -1, say".into()),
-        ron::Error::ExpectedString => ("expected a text in quotes".into(), "put it in quotes: \"...\"".into()),
+        ron::Error::ExpectedString => {
+            ("expected a text in quotes".into(), "put it in quotes: \"...\"".into())
+        }
         ron::Error::ExpectedStringEnd => {
             ("this text in quotes never ends".into(), "close it with a quotation mark".into())
         }
@@ -162,9 +166,10 @@ fn explain(code: &ron::Error) -> (String, String) {
             "expected a closing bracket `)`".into(),
             "close the bracket here; a decimal fraction takes a point, not a comma".into(),
         ),
-        ron::Error::ExpectedStructLike | ron::Error::ExpectedArray => {
-            ("expected an opening bracket".into(), "three numbers go as (x, y, z), a list as [first, second]".into())
-        }
+        ron::Error::ExpectedStructLike | ron::Error::ExpectedArray => (
+            "expected an opening bracket".into(),
+            "three numbers go as (x, y, z), a list as [first, second]".into(),
+        ),
         ron::Error::ExpectedNamedStructLike(name) => (
             match *name {
                 "" => "expected an opening bracket `(`".into(),
@@ -188,8 +193,12 @@ fn explain(code: &ron::Error) -> (String, String) {
         ron::Error::TrailingCharacters => {
             ("something follows the closing bracket".into(), "leave nothing after it but comments".into())
         }
-        ron::Error::ExpectedAttribute => ("`#` does not begin a comment".into(), "comments begin with //".into()),
-        ron::Error::Eof => ("the text ends too early".into(), "close every bracket and quotation mark".into()),
+        ron::Error::ExpectedAttribute => {
+            ("`#` does not begin a comment".into(), "comments begin with //".into())
+        }
+        ron::Error::Eof => {
+            ("the text ends too early".into(), "close every bracket and quotation mark".into())
+        }
         other => (other.to_string(), NOT_RON.into()),
     }
 }

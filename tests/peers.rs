@@ -131,7 +131,11 @@ fn tool_on_xyz() -> Vec<Dyad> {
 fn xyzac_trt() {
     compare("xyzac-trt.csv", false, |row| {
         let p = rotary_point(row);
-        let o = Vec3([0.0, row.get("pin_y_offset_mm"), row.get("pin_z_offset_mm") + row.get("pin_tool_offset_mm")]);
+        let o = Vec3([
+            0.0,
+            row.get("pin_y_offset_mm"),
+            row.get("pin_z_offset_mm") + row.get("pin_tool_offset_mm"),
+        ]);
         let table = vec![turns("a", p + o, X), turns("c", -o, Z), fixed("w", -p)];
         w_from_t(table, tool_on_xyz(), row, &with_xyz(&[("a", "joint_A_deg"), ("c", "joint_C_deg")]))
     });
@@ -141,7 +145,11 @@ fn xyzac_trt() {
 fn xyzbc_trt() {
     compare("xyzbc-trt.csv", false, |row| {
         let p = rotary_point(row);
-        let o = Vec3([row.get("pin_x_offset_mm"), 0.0, row.get("pin_z_offset_mm") + row.get("pin_tool_offset_mm")]);
+        let o = Vec3([
+            row.get("pin_x_offset_mm"),
+            0.0,
+            row.get("pin_z_offset_mm") + row.get("pin_tool_offset_mm"),
+        ]);
         let table = vec![turns("b", p + o, Y), turns("c", -o, Z), fixed("w", -p)];
         w_from_t(table, tool_on_xyz(), row, &with_xyz(&[("b", "joint_B_deg"), ("c", "joint_C_deg")]))
     });
@@ -278,7 +286,8 @@ fn factor_row(machine: &Machine, q: &[f64]) -> Vec<f64> {
     sweep.error_row(Wrench::at_point(along, p), &mut row);
     for j in 0..machine.workpiece_count() {
         let block = &mut row[6 * j..6 * j + 6];
-        let wrench = Wrench { f: Vec3([block[0], block[1], block[2]]), m: Vec3([block[3], block[4], block[5]]) };
+        let wrench =
+            Wrench { f: Vec3([block[0], block[1], block[2]]), m: Vec3([block[3], block[4], block[5]]) };
         let carried = machine.dyads()[j].placement.pose().inverse().carry_wrench(wrench);
         block.copy_from_slice(&carried.to_array().map(|c| -c));
     }
@@ -303,7 +312,8 @@ fn golden_positions_of_the_paper_machine() {
         assert!((p_6 - golden("pw6")).norm() < 1e-12, "{p_6:?}");
         assert!((p_6.norm() - 0.1 - row.get("dist6_minus_L_m")).abs() < 1e-12);
         let by_increment = factor_row(&machine, &q);
-        let linear: f64 = (increments.iter().flat_map(|d| d.to_array()).zip(by_increment)).map(|(d, r)| d * r).sum();
+        let linear: f64 =
+            (increments.iter().flat_map(|d| d.to_array()).zip(by_increment)).map(|(d, r)| d * r).sum();
         assert!((linear - row.get("linear_Jd_phi6_m")).abs() < 1e-12, "{linear}");
     }
 }

@@ -152,7 +152,8 @@ impl<'de> Deserialize<'de> for AxisForm {
             }
             fn visit_seq<A: de::SeqAccess<'de>>(self, mut seq: A) -> Result<AxisForm, A::Error> {
                 let mut next = |index| {
-                    seq.next_element::<f64>()?.ok_or_else(|| de::Error::invalid_length(index, &"three numbers"))
+                    seq.next_element::<f64>()?
+                        .ok_or_else(|| de::Error::invalid_length(index, &"three numbers"))
                 };
                 let vector = (next(0)?, next(1)?, next(2)?);
                 if seq.next_element::<f64>()?.is_some() {

@@ -78,18 +78,27 @@ impl Machine {
             let path = self.path_of(j);
             if !frames.insert(dyad.frame.as_str()) {
                 let name = dyad.frame.clone();
-                return Err((format!("{path}.frame"), MachineFault::NameTwice { what: "frame".into(), name }));
+                return Err((
+                    format!("{path}.frame"),
+                    MachineFault::NameTwice { what: "frame".into(), name },
+                ));
             }
             usable_name(&format!("{path}.frame"), "frame", &dyad.frame)?;
             check_dyad(dyad, &path, self.units)?;
             let Some(joint) = &dyad.joint else { continue };
             if !joints.insert(joint.name.as_str()) {
                 let name = joint.name.clone();
-                return Err((format!("{path}.joint.name"), MachineFault::NameTwice { what: "joint".into(), name }));
+                return Err((
+                    format!("{path}.joint.name"),
+                    MachineFault::NameTwice { what: "joint".into(), name },
+                ));
             }
             if joint.name == "t" || joint.name == "w" {
                 let name = joint.name.clone();
-                return Err((format!("{path}.joint.name"), MachineFault::BadName { what: "joint".into(), name }));
+                return Err((
+                    format!("{path}.joint.name"),
+                    MachineFault::BadName { what: "joint".into(), name },
+                ));
             }
         }
         if joints.is_empty() {
@@ -138,7 +147,10 @@ impl Machine {
             for (leader, factor) in joint.follows.as_ref().unwrap_or(&own) {
                 let path = format!("{}.joint.follows.{leader}", self.path_of(j));
                 if !(factor.is_finite() && factor.abs() < LARGEST) {
-                    return Err((path, MachineFault::NotFinite { what: "a factor of `follows`".into(), value: *factor }));
+                    return Err((
+                        path,
+                        MachineFault::NotFinite { what: "a factor of `follows`".into(), value: *factor },
+                    ));
                 }
                 let Some(index) = commands.iter().position(|c| c == leader) else {
                     let fault = MachineFault::Leader {
@@ -260,9 +272,7 @@ fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
         placement: placement(form, units, path)?,
         joint: form.joint.as_ref().map(|j| joint(j, &form.frame, units, path)).transpose()?,
         mass,
-        tolerance: (form.tolerance)
-            .map(|t| tolerance(t, units, &format!("{path}.tolerance")))
-            .transpose()?,
+        tolerance: (form.tolerance).map(|t| tolerance(t, units, &format!("{path}.tolerance"))).transpose()?,
     })
 }
 
@@ -295,12 +305,7 @@ fn placement(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Placement
         let unit = if turns { units.angle } else { units.length };
         let value = to_si(format!("{path}.moves[{i}]"), value, unit, "a move")?;
         let axis = Vec3(std::array::from_fn(|k| if k == along { 1.0 } else { 0.0 }));
-        pose = pose
-            * if turns {
-                Pose::turn(axis, value)
-            } else {
-                Pose::translation(axis.times(value))
-            };
+        pose = pose * if turns { Pose::turn(axis, value) } else { Pose::translation(axis.times(value)) };
     }
     let Placement { at, rotation } = pose.into();
     Ok(Placement {
@@ -320,7 +325,10 @@ fn joint(form: &JointForm, frame: &str, units: FileUnits, path: &str) -> Checked
         to_si(format!("{path}.joint.travel[0]"), from, unit, "a limit of `travel`")?;
         to_si(format!("{path}.joint.travel[1]"), to, unit, "a limit of `travel`")?;
         if from >= to {
-            return Err((format!("{path}.joint.travel"), MachineFault::TravelReversed { joint: name, from, to }));
+            return Err((
+                format!("{path}.joint.travel"),
+                MachineFault::TravelReversed { joint: name, from, to },
+            ));
         }
     }
     let nc = body.nc.as_ref().map(|nc| NcWord { address: nc.address.clone(), sign: nc.sign });

@@ -3,8 +3,8 @@
 use ron::ser::PrettyConfig;
 
 use super::form::{
-    AngleUnit, AxisForm, DyadForm, JointBody, JointForm, LengthUnit, MachineForm, NcForm, ToleranceForm, Triple,
-    UnitsForm,
+    AngleUnit, AxisForm, DyadForm, JointBody, JointForm, LengthUnit, MachineForm, NcForm, ToleranceForm,
+    Triple, UnitsForm,
 };
 use super::{Dyad, FileUnits, Joint, JointKind, Machine, Tolerance};
 use crate::document::EXTENSIONS;
@@ -44,7 +44,8 @@ pub(crate) fn to_text(form: &MachineForm) -> String {
         .extensions(ron::extensions::Extensions::empty())
         .compact_maps(true);
     let options = ron::Options::default().with_default_extension(EXTENSIONS);
-    let text = options.to_string_pretty(form, config).expect("a machine form has nothing that RON cannot write");
+    let text =
+        options.to_string_pretty(form, config).expect("a machine form has nothing that RON cannot write");
     format!("Machine{text}\n")
 }
 
