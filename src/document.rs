@@ -79,9 +79,21 @@ impl Document {
         let options = ron::Options::default().with_default_extension(EXTENSIONS);
         options.from_str(&self.text).map_err(|e| {
             let start = e.span.start;
-            let (message, mend) = explain(&e.code);
+            let (message, mend) = match self.at_end(start.line, start.col, &e.code) {
+                true if self.text.trim().is_empty() => ("the file is empty".into(), NOT_RON.into()),
+                true => explain(&ron::Error::Eof),
+                false => explain(&e.code),
+            };
             Error::Ron { place: Place::at(&self.file, start.line, start.col), message, mend }
         })
+    }
+
+    /// Whether RON's reader stopped because nothing more came, whatever it was waiting for.
+    fn at_end(&self, line: usize, column: usize, code: &ron::Error) -> bool {
+        use ron::Error::{DuplicateStructField, MissingStructField, TrailingCharacters};
+        let told =
+            matches!(code, MissingStructField { .. } | DuplicateStructField { .. } | TrailingCharacters);
+        !told && (line, column) >= line_and_column(&self.text, self.text.trim_end().len())
     }
 
     /// Where the value at `path` starts; where the path leads nowhere, its nearest parent.
@@ -107,6 +119,9 @@ impl Document {
     }
 }
 
+/// The mend where the text is not even near to what it should be.
+const NOT_RON: &str = "docs/machines.md shows the form of a machine file";
+
 /// What RON's reader says, in words that help, and the mend.
 fn explain(code: &ron::Error) -> (String, String) {
     let list = |names: &[&str]| names.join(", ");
@@ -127,11 +142,64 @@ fn explain(code: &ron::Error) -> (String, String) {
         ron::Error::DuplicateStructField { field, .. } => {
             (format!("field `{field}` is given twice"), "keep one of them".into())
         }
-        ron::Error::ExpectedComma => {
+        ron::Error::ExpectedComma | ron::Error::ExpectedArrayEnd => {
             ("expected a comma".into(), "separate fields and list entries with commas".into())
         }
-        ron::Error::Eof => ("the text ends too early".into(), "close the open bracket".into()),
-        other => (other.to_string(), "docs/machines.md shows the form of a machine file".into()),
+        ron::Error::ExpectedMapColon => {
+            ("expected a colon".into(), "write a field as name: value, with a colon between".into())
+        }
+        ron::Error::ExpectedFloat => {
+            ("expected a number".into(), "write a plain number, such as 158.5".into())
+        }
+        ron::Error::ExpectedInteger => ("expected a whole number".into(), "write 1 or -1, say".into()),
+        ron::Error::ExpectedString => {
+            ("expected a text in quotes".into(), "put it in quotes: \"...\"".into())
+        }
+        ron::Error::ExpectedStringEnd => {
+            ("this text in quotes never ends".into(), "close it with a quotation mark".into())
+        }
+        ron::Error::UnclosedBlockComment => ("this comment never ends".into(), "close it with */".into()),
+        ron::Error::ExpectedIdentifier => {
+            ("expected a word without quotes".into(), "leave out the quotes: length: mm".into())
+        }
+        ron::Error::ExpectedStructLikeEnd => (
+            "expected a closing bracket `)`".into(),
+            "close the bracket here; a decimal fraction takes a point, not a comma".into(),
+        ),
+        ron::Error::ExpectedStructLike | ron::Error::ExpectedArray => (
+            "expected an opening bracket".into(),
+            "three numbers go as (x, y, z), a list as [first, second]".into(),
+        ),
+        ron::Error::ExpectedNamedStructLike(name) => (
+            match *name {
+                "" => "expected an opening bracket `(`".into(),
+                name => format!("expected `{name}` in brackets: (field: value, ...)"),
+            },
+            NOT_RON.into(),
+        ),
+        ron::Error::ExpectedDifferentLength { expected, found } => {
+            let plural = if *found == 1 { "" } else { "s" };
+            let expected = if expected == "a tuple of size 3" { "three numbers" } else { expected };
+            (format!("expected {expected}, found {found} element{plural}"), "write (x, y, z)".into())
+        }
+        ron::Error::InvalidValueForType { expected, found } => {
+            // RON calls a bare word a unit value.
+            let found = if found == "a unit value" { "a word without quotes" } else { found };
+            (format!("expected {expected}, found {found}"), format!("write {expected}"))
+        }
+        ron::Error::ExpectedDifferentStructName { expected, found } => {
+            (format!("expected `{expected}`, found `{found}`"), format!("begin with {expected}("))
+        }
+        ron::Error::TrailingCharacters => {
+            ("something follows the closing bracket".into(), "leave nothing after it but comments".into())
+        }
+        ron::Error::ExpectedAttribute => {
+            ("`#` does not begin a comment".into(), "comments begin with //".into())
+        }
+        ron::Error::Eof => {
+            ("the text ends too early".into(), "close every bracket and quotation mark".into())
+        }
+        other => (other.to_string(), NOT_RON.into()),
     }
 }
 

@@ -266,7 +266,7 @@ fn machines() -> impl Strategy<Value = Machine> {
             for (i, (mut dyad, parts)) in list.into_iter().enumerate() {
                 dyad.frame = format!("{letter}{i}");
                 let parts = parts.or((letter == "f" && i == 0)
-                    .then_some({ (JointKind::Revolute, Vec3([0.0, 0.0, 1.0]), None, None, None) }));
+                    .then_some((JointKind::Revolute, Vec3([0.0, 0.0, 1.0]), None, None, None)));
                 dyad.joint = parts.map(|(kind, axis, travel, sign, follows)| {
                     let joint_name = if i % 2 == 0 { dyad.frame.clone() } else { format!("j{letter}{i}") };
                     let follows = (leader.as_ref())
@@ -333,7 +333,19 @@ fn assert_near(a: &Machine, b: &Machine) {
     }
 }
 
+/// The same cases on every run.
+fn fixed_cases() -> ProptestConfig {
+    ProptestConfig {
+        cases: 512,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(20_260_101),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
 proptest! {
+    #![proptest_config(fixed_cases())]
+
     #[test]
     fn random_machines_survive_the_file(machine in machines()) {
         let text = machine.to_ron();
@@ -356,5 +368,115 @@ proptest! {
         // A number read from a file is written as the same number in SI.
         let read = unit.to_si(value);
         prop_assert_eq!(unit.to_si(unit.write_si(read)).to_bits(), read.to_bits());
+    }
+}
+
+/// The `ron` blocks of a page.
+fn ron_blocks(page: &str) -> Vec<String> {
+    let mut blocks = Vec::new();
+    for part in page.split("```ron\n").skip(1) {
+        blocks.push(part.split("```").next().expect("a block ends").to_string());
+    }
+    blocks
+}
+
+#[test]
+fn every_example_of_the_page_on_machines_is_a_machine() {
+    let page = std::fs::read_to_string(root().join("docs/machines.md")).expect("the page");
+    let blocks = ron_blocks(&page);
+    assert!(blocks.len() >= 4);
+    for block in blocks {
+        Machine::parse("docs/machines.md", &block).unwrap_or_else(|e| panic!("{e}: {}\n{block}", e.mend()));
+    }
+}
+
+#[test]
+fn the_page_on_machines_lists_every_machine_that_ships() {
+    let page = std::fs::read_to_string(root().join("docs/machines.md")).expect("the page");
+    for (_, machine) in shipped() {
+        assert!(page.contains(&format!("`{}`", machine.name())), "{} is not listed", machine.name());
+    }
+}
+
+/// One recording of positions: commands, m or rad, and measured points, m.
+fn positions(machine: &Machine, file: &Path) -> Vec<(Vec<f64>, Vector3<f64>)> {
+    let text = std::fs::read_to_string(file).expect("a readable recording");
+    let mut rows = text.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<(&str, &str)> = (rows.next().expect("a header").split(','))
+        .map(|column| column.trim_end_matches(']').split_once('[').expect("a unit in brackets"))
+        .collect();
+    let cell = |row: &str, name: &str| -> Option<f64> {
+        let column = header.iter().position(|(n, _)| *n == name).expect("a column");
+        let unit = Unit::named(header[column].1).expect("a unit");
+        Some(unit.to_si(row.split(',').nth(column)?.trim().parse().ok().filter(|v: &f64| v.is_finite())?))
+    };
+    rows.filter_map(|row| {
+        let q = machine.commands().iter().map(|c| cell(row, c)).collect::<Option<Vec<f64>>>()?;
+        Some((q, Vector3::new(cell(row, "px")?, cell(row, "py")?, cell(row, "pz")?)))
+    })
+    .collect()
+}
+
+/// RMS of what is left after the instrument's frame and, unless given, the marker on the tool have been found, m.
+fn aligned_rms(machine: &Machine, file: &Path, marker: Option<Vector3<f64>>) -> f64 {
+    let chain = Chain::nominal(machine);
+    let samples: Vec<_> = positions(machine, file)
+        .into_iter()
+        .map(|(q, measured)| (chain.w_from_t(&q).to_isometry(), measured))
+        .collect();
+    let n = samples.len() as f64;
+    let mut point = marker.unwrap_or_default();
+    let mut rms = f64::INFINITY;
+    for _ in 0..if marker.is_some() { 1 } else { 400 } {
+        // Rigid alignment of model points with measured ones.
+        let model: Vec<_> = samples.iter().map(|(pose, _)| pose * nalgebra::Point3::from(point)).collect();
+        let centre = model.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
+        let middle = samples.iter().map(|(_, m)| m).sum::<Vector3<f64>>() / n;
+        let pairs = model.iter().zip(&samples);
+        let spread: nalgebra::Matrix3<f64> =
+            pairs.map(|(p, (_, m))| (m - middle) * (p.coords - centre).transpose()).sum();
+        let svd = spread.svd(true, true);
+        let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+        let mut flip = nalgebra::Matrix3::identity();
+        flip[(2, 2)] = (u * v_t).determinant().signum();
+        let turn = u * flip * v_t;
+        let shift = middle - turn * centre;
+        let residual = |(p, (_, m)): (&nalgebra::Point3<f64>, &(Isometry3<f64>, Vector3<f64>))| {
+            (turn * p.coords + shift - m).norm_squared()
+        };
+        rms = (model.iter().zip(&samples).map(residual).sum::<f64>() / n).sqrt();
+        if marker.is_none() {
+            // The marker: a mean, since each rotation is orthogonal.
+            let seen = |(pose, m): &(Isometry3<f64>, Vector3<f64>)| {
+                pose.rotation.inverse() * (turn.transpose() * (m - shift) - pose.translation.vector)
+            };
+            point = samples.iter().map(seen).sum::<Vector3<f64>>() / n;
+        }
+    }
+    rms
+}
+
+#[test]
+fn real_recordings_fit_their_machines_once_frames_are_aligned() {
+    let Some(folder) = recordings() else { return };
+    let prism = Vector3::new(1.01828e-3, -100.91023e-3, 335.65636e-3);
+    // Machine, recording, marker on the tool where it is known, most that may be left, m.
+    let cases = [
+        ("fanuc_r2000ic_165f", "fanuc_r2000ic/mark_A.csv", None, 0.7e-3),
+        ("fanuc_r2000ic_165f", "fanuc_r2000ic/mark_B.csv", None, 0.7e-3),
+        ("fanuc_r2000ic_165f", "fanuc_r2000ic/mark_C.csv", None, 0.7e-3),
+        ("dlr_justin_right", "dlr_justin/right.csv", None, 19e-3),
+        ("dlr_justin_left", "dlr_justin/left.csv", None, 19e-3),
+        ("franka_panda", "mukca/panda_2/front_center.csv", None, 8e-3),
+        ("kuka_iiwa14", "mukca/kuka_14/front.csv", None, 1e-3),
+        ("kinova_gen3_lite", "mukca/dinova_2/left.csv", None, 6e-3),
+        ("hilti_jaibot", "hilti_jaibot/flat.csv", Some(prism), 10e-3),
+        ("hilti_jaibot", "hilti_jaibot/seesaw.csv", Some(prism), 11e-3),
+    ];
+    for (name, file, marker, most) in cases {
+        let machine = Machine::open(root().join(format!("machines/{name}.ron"))).expect("a shipped machine");
+        let rms = aligned_rms(&machine, &folder.join(file), marker);
+        println!("{file}: {:.3} mm", rms * 1e3);
+        assert!(rms < most, "{file}: {:.3} mm are left", rms * 1e3);
     }
 }

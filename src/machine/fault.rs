@@ -65,7 +65,7 @@ pub enum MachineFault {
         word: String,
     },
     /// NaN or infinite, or too large to be meant.
-    #[error("{what} is {value}, not a usable number")]
+    #[error("{what} is {value:?}, not a usable number")]
     NotFinite {
         /// Of what.
         what: String,
@@ -87,7 +87,7 @@ pub enum MachineFault {
     Tolerance {
         /// `translation` or `rotation`.
         what: String,
-        /// In SI.
+        /// In the file's unit; in SI where there is no file.
         value: f64,
     },
     /// A mass that is negative.
@@ -97,6 +97,18 @@ pub enum MachineFault {
         frame: String,
         /// kg.
         value: f64,
+    },
+    /// A centre of mass on a frame without mass.
+    #[error("frame \"{frame}\" has a centre of mass but no mass")]
+    CentreWithoutMass {
+        /// Name of the frame.
+        frame: String,
+    },
+    /// A joint with an empty list of leaders.
+    #[error("joint \"{joint}\" follows nothing")]
+    FollowsNothing {
+        /// Name of the joint.
+        joint: String,
     },
     /// A joint follows a name that is no joint, or one that itself has no command.
     #[error("joint \"{joint}\" follows \"{leader}\", which has no command of its own")]
@@ -166,17 +178,24 @@ impl MachineFault {
             BadName { .. } => {
                 "use letters, digits, `_` and `-`, starting with a letter; `t` is the tool frame and the time column, `w` the workpiece frame".into()
             }
-            ZeroVector { .. } => "write a unit vector".into(),
+            ZeroVector { .. } => "write a vector of length 1, such as (0, 0, -1)".into(),
             AxisLength { unit: [x, y, z], .. } => {
                 format!("write one of \"x\" \"-x\" \"y\" \"-y\" \"z\" \"-z\", or the unit vector ({x}, {y}, {z})")
             }
             AxisWord { .. } => {
                 "write one of \"x\" \"-x\" \"y\" \"-y\" \"z\" \"-z\", or a unit vector (0, 0.6, 0.8)".into()
             }
-            NotFinite { .. } => "write a finite number below 1e9".into(),
+            NotFinite { .. } => "write a plain number; nothing on a machine is larger than 1e9 m or 1e9 rad".into(),
             TravelReversed { .. } => "write the lower limit first: travel: (lower, upper)".into(),
             Tolerance { .. } => "write a positive number: how far off you expect such a value to be".into(),
             Mass { .. } => "write a mass of zero or more, in kg".into(),
+            CentreWithoutMass { .. } => "add `mass: ...` in kg".into(),
+            FollowsNothing { joint } => {
+                format!("name what it follows, follows: {{\"{joint}\": 1}}, or leave `follows` out")
+            }
+            Leader { known, .. } if known.is_empty() => {
+                "let one joint move by itself: leave out its `follows`, or name it in its own".into()
+            }
             Leader { known, .. } => format!("joints that can lead: {known}"),
             TwoPlacements { .. } => "keep one of the two ways of saying where the frame is".into(),
             Unit { known, .. } => format!("write one of: {known}"),

@@ -61,7 +61,7 @@ impl Machine {
             machine = machine.with_gravity(vec3(gravity))?;
         }
         if let Some(form) = form.tolerance {
-            machine = machine.with_tolerance(tolerance(form, units))?;
+            machine = machine.with_tolerance(tolerance(form, units, "tolerance")?)?;
         }
         Ok(machine)
     }
@@ -138,6 +138,10 @@ impl Machine {
             self.joints().filter(|(_, j)| commanded(j)).map(|(_, j)| j.name.clone()).collect();
         let mut drives = vec![None; self.dyads.len()];
         for (j, joint) in self.joints() {
+            if joint.follows.as_ref().is_some_and(|leaders| leaders.is_empty()) {
+                let fault = MachineFault::FollowsNothing { joint: joint.name.clone() };
+                return Err((format!("{}.joint.follows", self.path_of(j)), fault));
+            }
             let own = [(joint.name.clone(), 1.0)].into();
             let mut terms = Vec::new();
             for (leader, factor) in joint.follows.as_ref().unwrap_or(&own) {
@@ -190,20 +194,41 @@ fn vec3((x, y, z): Triple) -> Vec3<f64> {
     Vec3([x, y, z])
 }
 
-fn finite(path: &str, (x, y, z): Triple, what: &str) -> Checked<()> {
-    for (i, value) in [x, y, z].into_iter().enumerate() {
-        if !(value.is_finite() && value.abs() < LARGEST) {
-            return Err((format!("{path}[{i}]"), MachineFault::NotFinite { what: what.into(), value }));
-        }
-    }
-    Ok(())
-}
-
+/// A pure number, or one in SI.
 fn number(path: String, value: f64, what: &str) -> Checked<f64> {
     if value.is_finite() && value.abs() < LARGEST {
         return Ok(value);
     }
     Err((path, MachineFault::NotFinite { what: what.into(), value }))
+}
+
+fn finite(path: &str, (x, y, z): Triple, what: &str) -> Checked<()> {
+    for (i, value) in [x, y, z].into_iter().enumerate() {
+        number(format!("{path}[{i}]"), value, what)?;
+    }
+    Ok(())
+}
+
+/// A number of the file in SI; what is too large is told as it was written.
+fn to_si(path: String, value: f64, unit: Unit, what: &str) -> Checked<f64> {
+    let si = unit.to_si(value);
+    if si.is_finite() && si.abs() < LARGEST {
+        return Ok(si);
+    }
+    Err((path, MachineFault::NotFinite { what: what.into(), value }))
+}
+
+fn vec_to_si(path: &str, (x, y, z): Triple, unit: Unit, what: &str) -> Checked<Vec3<f64>> {
+    let component = |i: usize, value| to_si(format!("{path}[{i}]"), value, unit, what);
+    Ok(Vec3([component(0, x)?, component(1, y)?, component(2, z)?]))
+}
+
+/// The nearest number that a file can say in `unit`, without the dust of rounding: 1e-15 m or rad at most.
+fn sayable(si: f64, unit: Unit) -> f64 {
+    let places = 1e15 / 10f64.powf(unit.from_si(1.0).log10().ceil());
+    let written = (unit.from_si(si) * places).round() / places;
+    // Adding zero turns -0 into 0.
+    unit.to_si(written) + 0.0
 }
 
 fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
@@ -214,21 +239,32 @@ fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
     Err((path.into(), MachineFault::BadName { what: what.into(), name: name.into() }))
 }
 
-fn tolerance(form: ToleranceForm, units: FileUnits) -> Tolerance {
-    Tolerance {
-        translation: units.length.to_si(form.translation),
-        rotation: units.angle.to_si(form.rotation),
-    }
+fn tolerance(form: ToleranceForm, units: FileUnits, path: &str) -> Checked<Tolerance> {
+    let component = |what: &str, value: f64, unit: Unit| {
+        let si = unit.to_si(value);
+        if si.is_finite() && si > 0.0 {
+            return Ok(si);
+        }
+        Err((format!("{path}.{what}"), MachineFault::Tolerance { what: what.into(), value }))
+    };
+    Ok(Tolerance {
+        translation: component("translation", form.translation, units.length)?,
+        rotation: component("rotation", form.rotation, units.angle)?,
+    })
 }
 
 fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
     let mass = match (form.mass, form.centre_of_mass) {
         (None, None) => None,
-        (mass, centre) => {
+        (None, Some(_)) => {
+            let fault = MachineFault::CentreWithoutMass { frame: form.frame.clone() };
+            return Err((format!("{path}.centre_of_mass"), fault));
+        }
+        (Some(mass), centre) => {
             let centre = centre.unwrap_or_default();
-            finite(&format!("{path}.centre_of_mass"), centre, "centre of mass")?;
-            let centre = Vec3(vec3(centre).0.map(|c| units.length.to_si(c)));
-            Some(MassPoint { mass: mass.unwrap_or(0.0), centre })
+            let path = format!("{path}.centre_of_mass");
+            let centre = vec_to_si(&path, centre, units.length, "a coordinate of `centre_of_mass`")?;
+            Some(MassPoint { mass, centre })
         }
     };
     Ok(Dyad {
@@ -236,18 +272,21 @@ fn dyad(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Dyad> {
         placement: placement(form, units, path)?,
         joint: form.joint.as_ref().map(|j| joint(j, &form.frame, units, path)).transpose()?,
         mass,
-        tolerance: form.tolerance.map(|t| tolerance(t, units)),
+        tolerance: (form.tolerance).map(|t| tolerance(t, units, &format!("{path}.tolerance"))).transpose()?,
     })
 }
 
 fn placement(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Placement> {
     let Some(moves) = &form.moves else {
         let (at, rotation) = (form.at.unwrap_or_default(), form.rotation.unwrap_or_default());
-        finite(&format!("{path}.at"), at, "a coordinate of `at`")?;
-        finite(&format!("{path}.rotation"), rotation, "a component of `rotation`")?;
         return Ok(Placement {
-            at: Vec3(vec3(at).0.map(|c| units.length.to_si(c))),
-            rotation: Vec3(vec3(rotation).0.map(|c| units.angle.to_si(c))),
+            at: vec_to_si(&format!("{path}.at"), at, units.length, "a coordinate of `at`")?,
+            rotation: vec_to_si(
+                &format!("{path}.rotation"),
+                rotation,
+                units.angle,
+                "a component of `rotation`",
+            )?,
         });
     };
     if form.at.is_some() || form.rotation.is_some() {
@@ -263,16 +302,16 @@ fn placement(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Placement
             MoveForm::Ry(value) => (1, value, true),
             MoveForm::Rz(value) => (2, value, true),
         };
-        number(format!("{path}.moves[{i}]"), value, "a move")?;
+        let unit = if turns { units.angle } else { units.length };
+        let value = to_si(format!("{path}.moves[{i}]"), value, unit, "a move")?;
         let axis = Vec3(std::array::from_fn(|k| if k == along { 1.0 } else { 0.0 }));
-        pose = pose
-            * if turns {
-                Pose::turn(axis, units.angle.to_si(value))
-            } else {
-                Pose::translation(axis.times(units.length.to_si(value)))
-            };
+        pose = pose * if turns { Pose::turn(axis, value) } else { Pose::translation(axis.times(value)) };
     }
-    Ok(pose.into())
+    let Placement { at, rotation } = pose.into();
+    Ok(Placement {
+        at: Vec3(at.0.map(|c| sayable(c, units.length))),
+        rotation: Vec3(rotation.0.map(|c| sayable(c, units.angle))),
+    })
 }
 
 fn joint(form: &JointForm, frame: &str, units: FileUnits, path: &str) -> Checked<Joint> {
@@ -283,8 +322,8 @@ fn joint(form: &JointForm, frame: &str, units: FileUnits, path: &str) -> Checked
     let name = body.name.clone().unwrap_or_else(|| frame.to_string());
     let axis = axis(body, &name, &format!("{path}.joint.axis"))?;
     if let Some((from, to)) = body.travel {
-        number(format!("{path}.joint.travel[0]"), from, "a limit of `travel`")?;
-        number(format!("{path}.joint.travel[1]"), to, "a limit of `travel`")?;
+        to_si(format!("{path}.joint.travel[0]"), from, unit, "a limit of `travel`")?;
+        to_si(format!("{path}.joint.travel[1]"), to, unit, "a limit of `travel`")?;
         if from >= to {
             return Err((
                 format!("{path}.joint.travel"),
@@ -353,9 +392,16 @@ fn check_dyad(dyad: &Dyad, path: &str, units: FileUnits) -> Checked<()> {
     {
         return Err((format!("{path}.mass"), MachineFault::Mass { frame: dyad.frame.clone(), value: mass }));
     }
+    if let Some(MassPoint { centre: Vec3([x, y, z]), .. }) = dyad.mass {
+        finite(&format!("{path}.centre_of_mass"), (x, y, z), "a coordinate of `centre_of_mass`")?;
+    }
     let Some(joint) = &dyad.joint else { return Ok(()) };
     usable_name(&format!("{path}.joint.name"), "joint", &joint.name)?;
     unit_axis(joint.axis, &joint.name, &format!("{path}.joint.axis"))?;
+    if let Some((from, to)) = joint.travel {
+        number(format!("{path}.joint.travel[0]"), from, "a limit of `travel`")?;
+        number(format!("{path}.joint.travel[1]"), to, "a limit of `travel`")?;
+    }
     if let Some((from, to)) = joint.travel.filter(|(from, to)| from >= to) {
         let unit = match joint.kind {
             JointKind::Prismatic => units.length,
