@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::identify::{Evaluator, channel};
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
-use crate::recording::{Header, NominalLength, Recording, Role, Sample, ToolPoint};
+use crate::recording::{Header, NominalLength, Recording, Role, ToolPoint};
 use crate::sensor::{Sensor, SensorState};
 use crate::units::Unit;
 
@@ -71,7 +71,7 @@ impl Sums {
 /// Model and residual of every sample of a recording; each row goes to `out` as CSV if one is given.
 ///
 /// A row has the input's columns as they were, then for each measured column `NAME_model[unit]` and `NAME_residual[unit]`
-/// (measured minus model). A drop-out keeps its row, with empty model cells where a command is missing.
+/// (measured minus model; of a rotation the rotation vector that is missing). A drop-out keeps its row, those cells empty.
 ///
 /// # Errors
 /// If the recording cannot be read, or belongs to a set-up that the calibration does not know ([`crate::identify::fit_setup`]
@@ -100,30 +100,34 @@ pub fn predict(
     let mut sweep = evaluator.workspace();
     let (mut lengths, mut angles) = (Sums::default(), Sums::default());
     let (mut dropped, mut extrapolated) = (0, 0);
-    for row in recording.rows()? {
-        let row = row?;
-        let mut tail = ",".repeat(2 * columns.len());
-        match &row.sample {
-            None => dropped += 1,
-            Some(sample) => {
-                extrapolated += u64::from(calibrated.extrapolates(&sample.commands));
-                let residuals = evaluator.residuals(&sample.commands, &sample.values, &mut sweep, None);
+    let (commands, values) = (machine.commands().len(), recording.value_count());
+    for block in recording.rows_with_text()? {
+        let block = block?;
+        for row in block.rows() {
+            let mut tail = ",".repeat(2 * columns.len());
+            if let Some(k) = row.sample {
+                let q = &block.chunk.commands[k * commands..(k + 1) * commands];
+                let measured = &block.chunk.values[k * values..(k + 1) * values];
+                extrapolated += u64::from(calibrated.extrapolates(q));
+                let residuals = evaluator.residuals(q, measured, &mut sweep, None);
+                let residuals = &residuals[..sensor.reading_count()];
                 match &sensor {
                     Sensor::Pose => {
                         lengths.add(&residuals[..3]);
-                        angles.add(&residuals[3..6]);
+                        angles.add(&residuals[3..]);
                     }
-                    Sensor::Joint { dyad } if is_revolute(machine, *dyad) => angles.add(&residuals[..1]),
-                    _ => lengths.add(&residuals[..sensor.reading_count()]),
+                    Sensor::Joint { dyad } if is_revolute(machine, *dyad) => angles.add(residuals),
+                    _ => lengths.add(residuals),
                 }
                 if out.is_some() {
-                    tail = cells(&columns, sample, &residuals[..sensor.reading_count()], &sensor);
+                    tail = cells(&columns, measured, residuals, &sensor);
                 }
             }
+            if let Some(out) = &mut out {
+                writeln!(out, "{}{tail}", row.text).map_err(failed)?;
+            }
         }
-        if let Some(out) = &mut out {
-            writeln!(out, "{}{tail}", row.text).map_err(failed)?;
-        }
+        dropped += block.chunk.dropped;
     }
     let ([rms_m, max_m, mean_m], [rms_rad, max_rad, mean_rad]) = (lengths.figures(), angles.figures());
     let samples = lengths.count.max(angles.count);
@@ -234,29 +238,29 @@ fn write_head(out: &mut dyn Write, recording: &Recording, columns: &[Measured]) 
 }
 
 /// `,model,residual` of every measured column.
-fn cells(columns: &[Measured], sample: &Sample, residuals: &[f64], sensor: &Sensor) -> String {
+fn cells(columns: &[Measured], measured: &[f64], residuals: &[f64], sensor: &Sensor) -> String {
     let mut text = String::new();
     let mut put = |unit: Unit, model: f64, residual: f64| {
         text.push_str(&format!(",{:.12e},{:.6e}", unit.from_si(model), unit.from_si(residual)));
     };
     let position = residuals.len().min(3);
     for i in 0..position {
-        put(columns[i].unit, sample.values[i] - residuals[i], residuals[i]);
+        put(columns[i].unit, measured[i] - residuals[i], residuals[i]);
     }
     if !matches!(sensor, Sensor::Pose) {
         return text;
     }
     // R_model = exp(φ)⁻¹ R_measured; the columns say it in the form in which it was measured.
     let turn = |x: &[f64]| Pose::exp(Twist::new(Vec3([0.0; 3]), Vec3([x[0], x[1], x[2]])));
-    let model = turn(&residuals[3..6]).inverse() * turn(&sample.values[3..6]);
+    let model = turn(&residuals[3..6]).inverse() * turn(&measured[3..6]);
     if columns.len() == 7 {
         let q = |pose: Pose<f64>| {
             let q = pose.to_isometry().rotation;
             [q.w, q.i, q.j, q.k]
         };
-        let (model, measured) = (q(model), q(turn(&sample.values[3..6])));
+        let (model, seen) = (q(model), q(turn(&measured[3..6])));
         for i in 0..4 {
-            put(columns[3 + i].unit, model[i], measured[i] - model[i]);
+            put(columns[3 + i].unit, model[i], seen[i] - model[i]);
         }
     } else {
         let vector = model.rotation_vector();

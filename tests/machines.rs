@@ -265,8 +265,13 @@ fn machines() -> impl Strategy<Value = Machine> {
             let mut named = Vec::new();
             for (i, (mut dyad, parts)) in list.into_iter().enumerate() {
                 dyad.frame = format!("{letter}{i}");
-                let parts = parts.or((letter == "f" && i == 0)
-                    .then_some((JointKind::Revolute, Vec3([0.0, 0.0, 1.0]), None, None, None)));
+                let parts = parts.or((letter == "f" && i == 0).then_some((
+                    JointKind::Revolute,
+                    Vec3([0.0, 0.0, 1.0]),
+                    None,
+                    None,
+                    None,
+                )));
                 dyad.joint = parts.map(|(kind, axis, travel, sign, follows)| {
                     let joint_name = if i % 2 == 0 { dyad.frame.clone() } else { format!("j{letter}{i}") };
                     let follows = (leader.as_ref())
