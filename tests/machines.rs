@@ -87,6 +87,15 @@ fn every_machine_written_and_read_again_is_the_same_machine_and_the_same_text() 
 }
 
 #[test]
+fn line_ends_and_byte_order_marks_of_other_systems_change_nothing() {
+    for (path, machine) in shipped() {
+        let text = std::fs::read_to_string(&path).expect("a readable machine");
+        let foreign = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+        assert_eq!(Machine::parse(&path, &foreign).expect("the same machine"), machine);
+    }
+}
+
+#[test]
 fn every_machine_moves_as_a_product_of_isometries_does() {
     for (path, machine) in shipped() {
         let chain = Chain::nominal(&machine);
@@ -265,8 +274,13 @@ fn machines() -> impl Strategy<Value = Machine> {
             let mut named = Vec::new();
             for (i, (mut dyad, parts)) in list.into_iter().enumerate() {
                 dyad.frame = format!("{letter}{i}");
-                let parts = parts.or((letter == "f" && i == 0)
-                    .then_some((JointKind::Revolute, Vec3([0.0, 0.0, 1.0]), None, None, None)));
+                let parts = parts.or((letter == "f" && i == 0).then_some((
+                    JointKind::Revolute,
+                    Vec3([0.0, 0.0, 1.0]),
+                    None,
+                    None,
+                    None,
+                )));
                 dyad.joint = parts.map(|(kind, axis, travel, sign, follows)| {
                     let joint_name = if i % 2 == 0 { dyad.frame.clone() } else { format!("j{letter}{i}") };
                     let follows = (leader.as_ref())
