@@ -28,6 +28,8 @@ pub(crate) struct Document {
 impl Document {
     pub fn new(file: impl AsRef<Path>, text: String) -> Result<Self> {
         let file = file.as_ref().to_path_buf();
+        // Some editors begin a text with a byte order mark.
+        let text = text.strip_prefix('\u{feff}').map(str::to_string).unwrap_or(text);
         let document = Document { file, text };
         if document.text.len() > MOST_BYTES {
             return Err(document.refuse(

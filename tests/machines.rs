@@ -87,6 +87,15 @@ fn every_machine_written_and_read_again_is_the_same_machine_and_the_same_text() 
 }
 
 #[test]
+fn line_ends_and_byte_order_marks_of_other_systems_change_nothing() {
+    for (path, machine) in shipped() {
+        let text = std::fs::read_to_string(&path).expect("a readable machine");
+        let foreign = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+        assert_eq!(Machine::parse(&path, &foreign).expect("the same machine"), machine);
+    }
+}
+
+#[test]
 fn every_machine_moves_as_a_product_of_isometries_does() {
     for (path, machine) in shipped() {
         let chain = Chain::nominal(&machine);
