@@ -1,15 +1,283 @@
-//! placeholder
-/// What can be wrong with a recording.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RecordingFault {
-    /// No unit.
-    #[error("column has no unit")]
-    NoUnit,
+//! A recording: one CSV file with what was commanded and what was measured.
+//!
+//! ```text
+//! # machine: ac_table_tilting
+//! # measurement: distance
+//! # nominal_length[mm]: 100
+//! t[s],x[mm],y[mm],z[mm],a[deg],c[deg],d[mm]
+//! 0.0000,0.0000,-44.0232,41.0652,75.0000,0.0000,-0.0159
+//! ```
+//!
+//! [`Recording::open`] reads header and column names and settles what every column is for; no row is held. Every pass
+//! ([`Recording::chunks`], [`Recording::rows_with_text`], [`Recording::scan`]) reads the file anew, line by line, in memory that
+//! does not grow with the file. Units are converted at this border: everything that comes out is m, rad, s, K.
+//!
+//! A row is a *drop-out*, left out and counted, where a command, the time, a direction or a measured number is empty or NaN.
+//! A *pause* is a time between two samples longer than five times the median one; derivatives start again after it.
+
+mod column;
+mod entry;
+mod fault;
+mod header;
+mod lines;
+mod reader;
+mod summary;
+mod text;
+
+pub use column::{Channel, Column, Role};
+pub use fault::RecordingFault;
+pub use header::{Header, Measurement, NominalLength, Sigma, ToolPoint};
+pub use reader::{Block, Chunk, Chunks, Row, Rows};
+pub use summary::Summary;
+
+use std::fs::File;
+use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::error::{Error, Place, Result};
+use crate::machine::Machine;
+use column::Layout;
+use header::Draft;
+use lines::{LONGEST, Lines, Stop};
+use reader::Pass;
+use text::Fail;
+
+/// Most that may stand before the data, bytes.
+const LONGEST_PREAMBLE: usize = 4 << 20;
+
+/// A recording whose header and columns fit the machine; its rows stay in the file.
+///
+/// ```
+/// use kincal::recording::{Measurement, Recording};
+///
+/// let machine = kincal::Machine::parse(
+///     "column.ron",
+///     r#"Machine(
+///         name: "column", units: (length: mm, angle: deg),
+///         workpiece: [(frame: "w")],
+///         tool: [(frame: "z", joint: Prismatic(axis: "z")), (frame: "t", at: (0, 0, 120))],
+///     )"#,
+/// )?;
+/// let text = "# measurement: joint\nz[mm],z_meas[um]\n0,0\n10,10003\n20,\n";
+/// let recording = Recording::from_bytes("scale.csv", text.as_bytes(), &machine)?;
+/// assert_eq!(recording.header().measurement, Measurement::Joint { dyad: 1 });
+/// for chunk in recording.chunks()? {
+///     let chunk = chunk?;
+///     assert_eq!(chunk.commands, [0.0, 0.01]);
+///     assert_eq!(chunk.values, [0.0, 0.010003]);
+///     assert_eq!(chunk.dropped, 1);
+/// }
+/// # Ok::<(), kincal::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Recording {
+    path: PathBuf,
+    name: String,
+    source: Source,
+    machine: Machine,
+    header: Header,
+    fixed: Vec<Option<f64>>,
+    layout: Layout,
+    warnings: Vec<String>,
+    preamble: String,
+    /// Number of the header row and the byte behind it.
+    data_from: (u64, u64),
 }
-impl RecordingFault {
-    /// How to mend it.
-    pub fn mend(&self) -> String {
-        String::new()
+
+#[derive(Clone, Debug)]
+enum Source {
+    File,
+    Bytes(Arc<[u8]>),
+}
+
+impl Source {
+    /// From byte `offset` on.
+    fn read_from(&self, path: &Path, offset: u64) -> Result<Box<dyn Read + Send>> {
+        match self {
+            Source::Bytes(bytes) => {
+                let mut cursor = Cursor::new(bytes.clone());
+                cursor.set_position(offset);
+                Ok(Box::new(cursor))
+            }
+            Source::File => {
+                let mut file = File::open(path).map_err(|e| Error::file(path, e))?;
+                if offset > 0 {
+                    file.seek(SeekFrom::Start(offset)).map_err(|e| Error::file(path, e))?;
+                }
+                Ok(Box::new(file))
+            }
+        }
     }
+}
+
+impl Recording {
+    /// Opens a file and reads header and column names; rows are not read, so that a fault in them shows only in a pass.
+    ///
+    /// # Errors
+    /// [`Error::File`], or [`Error::Recording`] with line and column: a missing joint, a column without unit, another machine.
+    pub fn open(path: impl AsRef<Path>, machine: &Machine) -> Result<Recording> {
+        Recording::read(path.as_ref().to_path_buf(), Source::File, machine)
+    }
+
+    /// The same from memory; `name` takes the place of the path in messages.
+    ///
+    /// # Errors
+    /// As [`Recording::open`].
+    pub fn from_bytes(name: &str, bytes: impl Into<Arc<[u8]>>, machine: &Machine) -> Result<Recording> {
+        Recording::read(PathBuf::from(name), Source::Bytes(bytes.into()), machine)
+    }
+
+    fn read(path: PathBuf, source: Source, machine: &Machine) -> Result<Recording> {
+        let mut lines = Lines::new(source.read_from(&path, 0)?, 0, 0);
+        let (preamble, draft, layout) = match preamble(&mut lines, machine) {
+            Ok(parts) => parts,
+            Err(Halt::Stop(stop)) => return Err(stopped(&path, stop, lines.number)),
+            Err(Halt::Fail(fail)) => return Err(error(&path, fail)),
+        };
+        let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        let data_from = (lines.number, lines.offset);
+        let Draft { header, fixed, warnings, .. } = draft;
+        let machine = machine.clone();
+        Ok(Recording { path, name, source, machine, header, fixed, layout, warnings, preamble, data_from })
+    }
+
+    /// What the recording says of itself.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// File name without folders.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The file as the user named it.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// How many measured numbers a sample has: distance, displacement, joint 1; position 3; pose 6 (position, rotation vector).
+    pub fn value_count(&self) -> usize {
+        self.header.measurement.value_count()
+    }
+
+    /// Whether there is a column `t`.
+    pub fn has_time(&self) -> bool {
+        self.layout.time.is_some()
+    }
+
+    /// Columns that are neither time, joint, direction nor measured, in the order of the file.
+    pub fn extra_channels(&self) -> &[Channel] {
+        &self.layout.channels
+    }
+
+    /// Every column as written, in the order of the file.
+    pub fn columns(&self) -> &[Column] {
+        &self.layout.columns
+    }
+
+    /// Per command the displacement that `# fixed` gives, m or rad; `None` where there is a column.
+    pub fn fixed(&self) -> &[Option<f64>] {
+        &self.fixed
+    }
+
+    /// Comments and header row as written, line ends included, without a byte order mark.
+    pub fn preamble(&self) -> &str {
+        &self.preamble
+    }
+
+    /// What is odd in header and columns, but no fault; [`Recording::scan`] adds what is odd in the rows.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// The samples in chunks of at most 4096, read anew from the file; after an error nothing more comes.
+    ///
+    /// # Errors
+    /// [`Error::File`] here; each chunk may bring [`Error::Recording`] with line and column.
+    pub fn chunks(&self) -> Result<Chunks<'_>> {
+        Ok(Pass::start(self)?.chunks())
+    }
+
+    /// The rows as written together with their samples, in blocks of at most 4096 rows; drop-outs are among the rows.
+    ///
+    /// # Errors
+    /// As [`Recording::chunks`].
+    pub fn rows_with_text(&self) -> Result<Rows<'_>> {
+        Ok(Pass::start(self)?.with_text())
+    }
+
+    /// Reads all rows once: checks them, counts, takes ranges.
+    ///
+    /// # Errors
+    /// The first fault in a row; [`RecordingFault::NoRows`] or [`RecordingFault::AllDropped`] where no sample is left.
+    pub fn scan(&self) -> Result<Summary> {
+        summary::scan(self)
+    }
+
+    /// Lines behind the header row.
+    fn data_lines(&self) -> Result<Lines> {
+        let (number, offset) = self.data_from;
+        Ok(Lines::new(self.source.read_from(&self.path, offset)?, number, offset))
+    }
+
+    fn error(&self, fail: Fail) -> Error {
+        error(&self.path, fail)
+    }
+
+    fn stopped(&self, stop: Stop, line: u64) -> Error {
+        stopped(&self.path, stop, line)
+    }
+}
+
+fn error(path: &Path, Fail { line, column, fault }: Fail) -> Error {
+    let line = usize::try_from(line).unwrap_or(usize::MAX);
+    Error::Recording { place: Place::at(path, line, column), fault }
+}
+
+fn stopped(path: &Path, stop: Stop, line: u64) -> Error {
+    match stop {
+        Stop::Io(source) => Error::file(path, source),
+        Stop::TooLong => error(path, Fail::at(line, 0, RecordingFault::LineTooLong { limit: LONGEST })),
+    }
+}
+
+/// Why the preamble ends before its end.
+enum Halt {
+    Stop(Stop),
+    Fail(Fail),
+}
+
+impl From<Fail> for Halt {
+    fn from(fail: Fail) -> Self {
+        Halt::Fail(fail)
+    }
+}
+
+/// Reads up to and including the header row.
+fn preamble(lines: &mut Lines, machine: &Machine) -> std::result::Result<(String, Draft, Layout), Halt> {
+    let (mut text, mut draft) = (String::new(), Draft::new(machine));
+    while let Some(line) = lines.next().map_err(Halt::Stop)? {
+        let fail = |fault| Fail::at(lines.number, 0, fault);
+        let utf8 = |range| std::str::from_utf8(lines.bytes(range)).map_err(|_| fail(RecordingFault::NotUtf8));
+        let (mut raw, mut content) = (utf8(line.raw)?, utf8(line.content)?);
+        if lines.number == 1 {
+            raw = raw.strip_prefix('\u{feff}').unwrap_or(raw);
+            content = content.strip_prefix('\u{feff}').unwrap_or(content);
+        }
+        if text.len() + raw.len() > LONGEST_PREAMBLE {
+            return Err(fail(RecordingFault::PreambleTooLong { limit: LONGEST_PREAMBLE }).into());
+        }
+        text.push_str(raw);
+        let trimmed = content.trim();
+        if trimmed.starts_with('#') {
+            draft.take(machine, lines.number, content)?;
+        } else if !trimmed.is_empty() {
+            let layout = Layout::resolve(machine, &mut draft, lines.number, content.as_bytes())?;
+            return Ok((text, draft, layout));
+        }
+    }
+    let empty = text.trim().is_empty();
+    Err(Fail::at(0, 0, if empty { RecordingFault::Empty } else { RecordingFault::NoHeaderRow }).into())
 }

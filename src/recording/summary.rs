@@ -1,0 +1,217 @@
+//! One full pass: every row checked, ranges and counts taken.
+
+use super::Recording;
+use super::column::Role;
+use super::reader::{Chunk, Pass};
+use super::text::Fail;
+use super::{RecordingFault as Fault, entry};
+use crate::error::Result;
+use crate::units::Unit;
+
+/// A difference between a follower's column and its coupling that is worth a warning, m or rad.
+const COUPLING_TOLERANCE: f64 = 1e-6;
+
+/// A command that moves by no more than this stands still, m or rad.
+const STANDSTILL: f64 = 1e-9;
+
+/// A gap in time longer than this many median steps is a pause.
+const PAUSE_STEPS: f64 = 5.0;
+
+/// What a recording holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// Rows of the file, `samples + dropped`.
+    pub rows: u64,
+    /// Rows that can be used.
+    pub samples: u64,
+    /// Rows left out because a command, time, direction or measured number is missing.
+    pub dropped: u64,
+    /// Least and greatest value of every command over the samples, m or rad; both the same where the header fixes it.
+    pub commands: Vec<(f64, f64)>,
+    /// Per command whether it moves at all.
+    pub moving: Vec<bool>,
+    /// First and last time, s.
+    pub time: Option<(f64, f64)>,
+    /// Median time from a sample to the next, s, to 2 %; `None` without time or with a single sample.
+    pub step: Option<f64>,
+    /// A longer time between two samples is a pause, s: five median steps, rounded up to the next of 32 steps per octave.
+    pub pause_after: Option<f64>,
+    /// How many pauses there are.
+    pub pauses: u64,
+    /// What is odd, but no fault: ignored header keys, couplings that do not hold, travel that is left.
+    pub warnings: Vec<String>,
+}
+
+/// Times between samples, counted in bins of 1/32 octave: median and pauses of any number of samples in bounded memory.
+struct Steps {
+    bins: Vec<u64>,
+    count: u64,
+}
+
+impl Steps {
+    const PER_OCTAVE: f64 = 32.0;
+    /// 2^-40 s is the least step told from zero, 2^50 s the longest.
+    const LEAST: f64 = -40.0 * Self::PER_OCTAVE;
+    const BINS: usize = 90 * 32;
+
+    fn new() -> Self {
+        Steps { bins: vec![0; Self::BINS], count: 0 }
+    }
+
+    fn bin(step: f64) -> usize {
+        ((step.log2() * Self::PER_OCTAVE - Self::LEAST) as usize).min(Self::BINS - 1)
+    }
+
+    fn edge(bin: f64) -> f64 {
+        ((bin + Self::LEAST) / Self::PER_OCTAVE).exp2()
+    }
+
+    fn take(&mut self, step: f64) {
+        self.bins[Self::bin(step)] += 1;
+        self.count += 1;
+    }
+
+    /// Median step, length of a pause, number of pauses.
+    fn pauses(&self) -> Option<(f64, f64, u64)> {
+        let mut below = 0;
+        let median = self.bins.iter().position(|count| {
+            below += count;
+            2 * below >= self.count && below > 0
+        })?;
+        let median = Self::edge(median as f64 + 0.5);
+        let first = Self::bin(PAUSE_STEPS * median) + 1;
+        let pauses = self.bins.get(first..).map_or(0, |bins| bins.iter().sum());
+        Some((median, Self::edge(first as f64), pauses))
+    }
+}
+
+pub(super) fn scan(recording: &Recording) -> Result<Summary> {
+    let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.fixed.len()];
+    let (mut samples, mut dropped) = (0, 0);
+    let (mut time, mut steps) = (None, Steps::new());
+    let mut chunks = Pass::start(recording)?.chunks();
+    for chunk in &mut chunks {
+        let Chunk { len, time: times, commands, dropped: left_out, .. } = chunk?;
+        samples += len as u64;
+        dropped += left_out;
+        for row in commands.chunks_exact(ranges.len()) {
+            for (range, value) in ranges.iter_mut().zip(row) {
+                *range = (range.0.min(*value), range.1.max(*value));
+            }
+        }
+        for t in times.into_iter().flatten() {
+            let (first, last) = time.unwrap_or((t, t));
+            if t > last {
+                steps.take(t - last);
+            }
+            time = Some((first, t));
+        }
+    }
+    let pass = chunks.pass;
+    if pass.rows == 0 {
+        return Err(recording.error(Fail::at(0, 0, Fault::NoRows)));
+    }
+    if samples == 0 {
+        let (column, count) =
+            pass.drops.iter().enumerate().max_by_key(|(i, n)| (**n, usize::MAX - i)).unwrap_or((0, &0));
+        let column = recording.layout.columns[column].name.clone();
+        return Err(recording.error(Fail::at(
+            0,
+            0,
+            Fault::AllDropped { rows: pass.rows, column, count: *count },
+        )));
+    }
+    let mut warnings = recording.warnings.clone();
+    warn_of_couplings(recording, &pass.worst, &mut warnings);
+    warn_of_travel(recording, &ranges, &mut warnings);
+    let moving: Vec<bool> = ranges.iter().map(|(from, to)| to - from > STANDSTILL).collect();
+    if !moving.contains(&true) {
+        warnings.push("no joint moves in this recording".into());
+    }
+    let (step, pause_after, pauses) = match steps.pauses() {
+        Some((step, pause, count)) => (Some(step), Some(pause), count),
+        None => (None, None, 0),
+    };
+    Ok(Summary {
+        rows: pass.rows,
+        samples,
+        dropped,
+        commands: ranges,
+        moving,
+        time,
+        step,
+        pause_after,
+        pauses,
+        warnings,
+    })
+}
+
+fn warn_of_couplings(recording: &Recording, worst: &[(f64, u64)], warnings: &mut Vec<String>) {
+    for ((column, _), (difference, line)) in recording.layout.followers.iter().zip(worst) {
+        if *difference > COUPLING_TOLERANCE {
+            let column = &recording.layout.columns[*column];
+            let (name, value) = (&column.name, brief(column.unit.from_si(*difference)));
+            let unit = column.unit;
+            warnings.push(format!(
+                "column `{name}` differs by up to {value} {unit} from what the machine's couplings give (line {line}); the couplings are used"
+            ));
+        }
+    }
+}
+
+fn warn_of_travel(recording: &Recording, ranges: &[(f64, f64)], warnings: &mut Vec<String>) {
+    for (c, (from, to)) in ranges.iter().enumerate() {
+        let joint = recording.machine.command_joint(c);
+        let Some((least, most)) = joint.travel else { continue };
+        let slack = 1e-6 * (most - least);
+        if *from >= least - slack && *to <= most + slack {
+            continue;
+        }
+        let written = recording.layout.columns.iter().find(|column| column.role == Role::Command(c));
+        let example = || Unit::named(entry::example_unit(entry::quantity_of(joint.kind)));
+        let Some(unit) = written.map(|column| column.unit).or_else(example) else { continue };
+        let shown = |value: f64| brief(unit.from_si(value));
+        warnings.push(format!(
+            "joint \"{}\" is commanded from {} to {} {unit}, beyond its travel from {} to {} {unit}",
+            joint.name,
+            shown(*from),
+            shown(*to),
+            shown(least),
+            shown(most),
+        ));
+    }
+}
+
+/// A number with at most six decimals.
+fn brief(value: f64) -> String {
+    let text = format!("{value:.6}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_of_many_median_steps_is_a_pause() {
+        let mut steps = Steps::new();
+        assert_eq!(steps.pauses(), None);
+        for step in [1e-3, 1e-3, 1e-3, 1.1e-3, 0.9e-3, 0.9e-3, 4e-3, 5.5e-3, 60.0] {
+            steps.take(step);
+        }
+        let (median, pause, count) = steps.pauses().expect("steps");
+        assert!((median - 1e-3).abs() < 0.02 * 1e-3, "{median}");
+        assert!((5e-3..5.2e-3).contains(&pause), "{pause}");
+        assert_eq!(count, 2);
+    }
+
+    #[test]
+    fn extreme_steps_do_not_leave_the_bins() {
+        let mut steps = Steps::new();
+        for step in [f64::MIN_POSITIVE, 1e15, 2e15] {
+            steps.take(step);
+        }
+        assert!(steps.pauses().is_some());
+    }
+}
