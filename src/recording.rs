@@ -16,6 +16,7 @@
 //! A *pause* is a time between two samples longer than five times the median one; derivatives start again after it.
 
 mod column;
+mod entry;
 mod fault;
 mod header;
 mod lines;

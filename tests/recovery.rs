@@ -10,12 +10,12 @@ use kincal::simulate::{Instrument, random_commands, random_deviations, recording
 use kincal::{CalibratedMachine, Machine};
 
 /// Deviations as a part of the tolerances: small enough that second-order terms stay below the noise.
-const SIZE: f64 = 0.1;
+const SIZE: f64 = 0.01;
 
 /// Noise of lengths and angles: a hundredth of the machine's own tolerance.
 fn noise(machine: &Machine) -> (f64, f64) {
     let tolerance = machine.tolerance(0);
-    (0.01 * tolerance.translation, 0.01 * tolerance.rotation)
+    (0.001 * tolerance.translation, 0.001 * tolerance.rotation)
 }
 
 fn instrument(machine: &Machine, sensor: Sensor) -> (Instrument, Vec<String>) {

@@ -1,7 +1,8 @@
 //! The header row: which column plays which part, in which unit.
 
 use super::RecordingFault as Fault;
-use super::header::{Draft, Measurement, NominalLength, example_unit, quantity_of};
+use super::entry::{example_unit, quantity_of};
+use super::header::{Draft, Measurement, NominalLength};
 use super::text::{self, Fail};
 use crate::Machine;
 use crate::machine::Drive;

@@ -217,7 +217,7 @@ impl<'a> Pass<'a> {
             }
             self.rows += 1;
             self.parse(&line)?;
-            self.check_time(&line)?;
+            self.check_time()?;
             if let Some(column) = self.needed.iter().find(|i| self.cells[**i].is_nan()) {
                 self.drops[*column] += 1;
                 chunk.dropped += 1;
@@ -281,7 +281,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Time must go forward, over drop-outs too.
-    fn check_time(&mut self, _line: &Line) -> Result<()> {
+    fn check_time(&mut self) -> Result<()> {
         let Some(column) = self.recording.layout.time else { return Ok(()) };
         let t = self.cells[column];
         if t.is_nan() {
@@ -349,7 +349,7 @@ impl<'a> Pass<'a> {
 /// Rotation vector (rad, angle in [0, pi]) of a quaternion, scalar part first; its length where that is off by more than 1e-3.
 fn rotation_vector(q: [f64; 4]) -> std::result::Result<[f64; 3], f64> {
     let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
-    if !((length - 1.0).abs() <= 1e-3) {
+    if (length - 1.0).abs() > 1e-3 {
         return Err(length);
     }
     let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };

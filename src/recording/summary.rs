@@ -4,7 +4,7 @@ use super::Recording;
 use super::column::Role;
 use super::reader::{Chunk, Pass};
 use super::text::Fail;
-use super::{RecordingFault as Fault, header};
+use super::{RecordingFault as Fault, entry};
 use crate::error::Result;
 use crate::units::Unit;
 
@@ -168,7 +168,7 @@ fn warn_of_travel(recording: &Recording, ranges: &[(f64, f64)], warnings: &mut V
             continue;
         }
         let written = recording.layout.columns.iter().find(|column| column.role == Role::Command(c));
-        let example = || Unit::named(header::example_unit(header::quantity_of(joint.kind)));
+        let example = || Unit::named(entry::example_unit(entry::quantity_of(joint.kind)));
         let Some(unit) = written.map(|column| column.unit).or_else(example) else { continue };
         let shown = |value: f64| brief(unit.from_si(value));
         warnings.push(format!(
@@ -197,7 +197,7 @@ mod tests {
     fn a_gap_of_many_median_steps_is_a_pause() {
         let mut steps = Steps::new();
         assert_eq!(steps.pauses(), None);
-        for step in [1e-3, 1e-3, 1.1e-3, 0.9e-3, 4e-3, 5.5e-3, 60.0] {
+        for step in [1e-3, 1e-3, 1e-3, 1.1e-3, 0.9e-3, 0.9e-3, 4e-3, 5.5e-3, 60.0] {
             steps.take(step);
         }
         let (median, pause, count) = steps.pauses().expect("steps");
