@@ -45,7 +45,7 @@ pub fn demo(seed: u64) -> Result<Demo> {
     let mut instrument = Instrument::new(Sensor::Distance { absolute: false }, NOISE, 0.0);
     instrument.state.length = BAR;
     let header = [format!("nominal_length[m]: {BAR}")];
-    let text = recording(&truth, &instrument, &path, &header, seed);
+    let text = recording(&truth, &instrument, &path, &header, seed.wrapping_add(1));
     let recordings = [Recording::from_bytes("demo_bk4.csv", text.clone().into_bytes(), &machine)?];
     let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
     Ok(Demo { truth, recording: text, calibrated, fit })

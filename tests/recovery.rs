@@ -4,18 +4,32 @@ mod common;
 
 use kincal::identify::{Fit, Loss, Options, Solver, calibrate};
 use kincal::lie::Vec3;
+use kincal::machine::Tolerance;
+use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
 use kincal::simulate::{Instrument, random_commands, random_deviations, recording};
 use kincal::{CalibratedMachine, Machine};
 
-/// Deviations as a part of the tolerances: small enough that second-order terms stay below the noise.
-const SIZE: f64 = 0.01;
+/// Tolerances as a part of the file's. What the data do not see is known to a tolerance only, and its square (a centimetre times a
+/// degree, where a tool is only roughly known) must stay below the noise for a linear comparison with the truth.
+const SIZE: f64 = 0.004;
 
-/// Noise of lengths and angles: a hundredth of the machine's own tolerance.
+/// The machine with smaller tolerances.
+fn tightened(machine: &Machine) -> Machine {
+    let smaller = |t: Tolerance| Tolerance { translation: SIZE * t.translation, rotation: SIZE * t.rotation };
+    let mut dyads: Vec<_> = machine.dyads().to_vec();
+    for (j, dyad) in dyads.iter_mut().enumerate() {
+        dyad.tolerance = Some(smaller(machine.tolerance(j)));
+    }
+    let tool = dyads.split_off(machine.workpiece_count());
+    Machine::new(machine.name(), machine.units(), dyads, tool).expect("as sound as before")
+}
+
+/// Noise of lengths and angles: a twentieth of the machine's own tolerance.
 fn noise(machine: &Machine) -> (f64, f64) {
     let tolerance = machine.tolerance(0);
-    (0.001 * tolerance.translation, 0.001 * tolerance.rotation)
+    (0.05 * tolerance.translation, 0.05 * tolerance.rotation)
 }
 
 fn instrument(machine: &Machine, sensor: Sensor) -> (Instrument, Vec<String>) {
@@ -62,7 +76,9 @@ fn worst(truth: &CalibratedMachine, fit: &Fit) -> (f64, usize) {
 #[test]
 fn identified_combinations_lie_within_four_standard_errors_for_every_machine_and_measurement() {
     let direction_w = Vec3([0.48, 0.6, 0.64]);
+    let mut too_far = Vec::new();
     for (n, (name, machine)) in common::machines().into_iter().enumerate() {
+        let machine = tightened(&machine);
         let (joint, _) = machine.joints().next().expect("a joint");
         let sensors = [
             Sensor::Pose,
@@ -74,38 +90,70 @@ fn identified_combinations_lie_within_four_standard_errors_for_every_machine_and
         ];
         let seed = 100 + n as u64;
         let truth = CalibratedMachine::nominal(machine.clone())
-            .with_deviations(random_deviations(&machine, SIZE, seed));
+            .with_deviations(random_deviations(&machine, 1.0, seed));
         for sensor in sensors {
             let (instrument, header) = instrument(&machine, sensor.clone());
             let count = 800 / sensor.reading_count();
-            let commands = random_commands(&machine, count, seed);
-            let csv = recording(&truth, &instrument, &commands, &header, seed);
+            let commands = random_commands(&machine, count, seed + 10_000);
+            let csv = recording(&truth, &instrument, &commands, &header, seed + 20_000);
             let recordings = [Recording::from_bytes("simulated.csv", csv.into_bytes(), &machine)
                 .unwrap_or_else(|e| panic!("{name}: {e}"))];
             let (_, fit) = calibrate(&machine, &recordings, Options::default())
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
             let (worst, seen) = worst(&truth, &fit);
             println!(
-                "{name:<26} {sensor:?}: rank {}, {seen} identified, worst {worst:.2} standard errors",
-                fit.rank
+                "{name:<26} {sensor:?}: rank {}, {seen} identified, worst {worst:.2} standard errors, {} after {} steps, loss {:.1}, sigma {:.2e}",
+                fit.rank, fit.stop, fit.steps, fit.loss_value, fit.recordings[0].sigma
             );
             assert!(seen > 0, "{name} {sensor:?}: nothing identified");
-            assert!(worst <= 4.0, "{name} {sensor:?}: off by {worst:.2} standard errors");
+            if worst > 4.0 {
+                too_far.push(format!("{name} {sensor:?}: off by {worst:.2} standard errors"));
+            }
             let left = fit.recordings[0].sigma;
             let (m, rad) = noise(&machine);
             let near = |true_noise: f64| (left / true_noise - 1.0).abs() < 0.15;
             assert!(near(m) || near(rad), "{name} {sensor:?}: noise {left:.2e}, put in {m:.2e}");
         }
     }
+    assert!(too_far.is_empty(), "{too_far:#?}");
+}
+
+#[test]
+fn predictions_at_new_poses_are_as_good_as_the_noise_allows_with_deviations_of_full_size() {
+    for (n, (name, machine)) in common::machines().into_iter().enumerate() {
+        let seed = 500 + 10 * n as u64;
+        let truth = CalibratedMachine::nominal(machine.clone())
+            .with_deviations(random_deviations(&machine, 1.0, seed));
+        for sensor in [Sensor::Pose, Sensor::Position, Sensor::Distance { absolute: false }] {
+            let (mut instrument, header) = instrument(&machine, sensor.clone());
+            let record = |instrument: &Instrument, seed: u64| {
+                let commands = random_commands(&machine, 600, seed);
+                let csv = recording(&truth, instrument, &commands, &header, seed + 1);
+                Recording::from_bytes("r.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))
+            };
+            let learnt = [record(&instrument, seed + 2)];
+            let (calibrated, fit) =
+                calibrate(&machine, &learnt, Options::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let noise = instrument.noise_m;
+            (instrument.noise_m, instrument.noise_rad) = (0.0, 0.0);
+            let new = record(&instrument, seed + 4);
+            let error =
+                predict(&calibrated, &new, None).unwrap_or_else(|e| panic!("{e}")).rms_m.expect("lengths");
+            let values = if sensor == (Sensor::Distance { absolute: false }) { 1.0 } else { 3.0f64 };
+            let expected = noise * values.sqrt() * (fit.information.used / fit.readings as f64).sqrt();
+            println!("{name:<26} {sensor:?}: {:.2} of what the noise allows", error / expected);
+            assert!(error < 2.0 * expected, "{name} {sensor:?}: {error:.2e} m, expected {expected:.2e} m");
+        }
+    }
 }
 
 #[test]
 fn gross_outliers_are_told_and_do_not_bend_the_fit() {
-    let machine = common::machine("six_r_arm");
+    let machine = tightened(&common::machine("six_r_arm"));
     let truth =
-        CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(&machine, SIZE, 5));
+        CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(&machine, 1.0, 5));
     let (instrument, header) = instrument(&machine, Sensor::Position);
-    let csv = recording(&truth, &instrument, &random_commands(&machine, 300, 5), &header, 5);
+    let csv = recording(&truth, &instrument, &random_commands(&machine, 300, 6), &header, 7);
     // Every fiftieth row reads 5 mm too much in x.
     let mut rows = 0;
     let spoilt: Vec<String> = csv
@@ -143,7 +191,7 @@ fn the_named_solvers_do_what_their_names_say() {
     let truth =
         CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(&machine, 1.0, 3));
     let (instrument, header) = instrument(&machine, Sensor::Distance { absolute: false });
-    let csv = recording(&truth, &instrument, &random_commands(&machine, 600, 3), &header, 3);
+    let csv = recording(&truth, &instrument, &random_commands(&machine, 600, 4), &header, 5);
     let recordings =
         [Recording::from_bytes("d.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))];
     let run =
