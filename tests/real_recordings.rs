@@ -336,6 +336,7 @@ fn losses_side_by_side() {
     let losses = [
         ("squares", Loss::Squares),
         ("huber 3", Loss::Huber { k: 3.0 }),
+        ("huber 2", Loss::Huber { k: 2.0 }),
         ("huber 1.345", Loss::Huber { k: 1.345 }),
         ("tukey 4.685", Loss::Tukey { c: 4.685 }),
     ];
