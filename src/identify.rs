@@ -251,7 +251,7 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
             let own = kinds.iter().zip(&normal.tallies).filter(|(k, _)| *k == kind);
             own.for_each(|(_, tally)| sum.add(tally));
             let scale = |sum2: f64, rows: f64, present: f64| {
-                if rows > 0.0 { (sum2 / (rows * left)).sqrt().max(1e-12) } else { present }
+                if rows > 0.0 { (sum2 / (rows * left)).sqrt().max(thin::FINEST) } else { present }
             };
             Noise {
                 length: scale(sum.weighted_length2, sum.length_weight, present.length),

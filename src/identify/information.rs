@@ -6,6 +6,9 @@ use super::unknowns::Layout;
 
 /// Eigenvalues of the scaled information below this part of the largest are rounding: not seen.
 pub(crate) const SEEN: f64 = 1e-12;
+/// An unknown without prior whose information is below this, in units of its tolerance, is open: its standard error exceeds thirty
+/// tolerances. Two socket points, say, see the turn about their line only through the noise of the points.
+const OPEN: f64 = 1e-3;
 
 /// The information of the data in coordinates scaled by the tolerances, and what follows from it together with the prior.
 #[derive(Clone, Debug)]
@@ -62,27 +65,31 @@ impl Information {
         );
         let directions = DMatrix::from_fn(order.len(), order.len(), |a, i| eigen.eigenvectors[(a, order[i])]);
 
-        // (28): posterior covariance; where no prior counts, only the seen part of the space has one.
-        let mut full = scaled.clone();
+        // (28): posterior covariance, and what neither data nor prior hold.
+        let mut full = scaled;
         if prior {
             positions.iter().for_each(|i| full[(*i, *i)] += 1.0);
         }
         let eigen = SymmetricEigen::new(full);
+        let loose = if prior { OPEN.max(3e-15 * largest) } else { floor };
         let mut variance = DVector::zeros(layout.len);
-        for (i, value) in eigen.eigenvalues.iter().enumerate() {
-            let vector = eigen.eigenvectors.column(i);
+        let mut open = Vec::new();
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let held = *value > loose;
             for (a, x) in vector.iter().enumerate() {
-                if *value > floor.max(1e-300) {
+                if held {
                     variance[a] += x * x / value;
                 } else if x.abs() > 1e-4 {
                     variance[a] = f64::INFINITY;
                 }
             }
+            if !held && rest.iter().any(|i| vector[*i].abs() > 0.1) {
+                open.push(vector.into_owned());
+            }
         }
         let used =
             strength.iter().map(|s| if prior { s / (1.0 + s) } else { f64::from(*s > 0.0) }).sum::<f64>()
                 + (rest.len() as f64);
-        let open = open_directions(&outer, &cross, &inner, &rest, layout.len, floor);
         let used = used - open.len() as f64;
         Information { rank, directions, strength, positions, variance, open, used }
     }
@@ -96,28 +103,4 @@ fn pseudo_inverse(matrix: &DMatrix<f64>, largest: f64) -> DMatrix<f64> {
     let eigen = SymmetricEigen::new(matrix.clone());
     let inverse = eigen.eigenvalues.map(|v| if v > SEEN * largest { 1.0 / v } else { 0.0 });
     &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
-}
-
-/// Directions among the unknowns without prior that no data see, even with everything else held by its prior.
-fn open_directions(
-    outer: &DMatrix<f64>,
-    cross: &DMatrix<f64>,
-    inner: &DMatrix<f64>,
-    rest: &[usize],
-    len: usize,
-    floor: f64,
-) -> Vec<DVector<f64>> {
-    if rest.is_empty() {
-        return Vec::new();
-    }
-    let held = inner + DMatrix::identity(inner.nrows(), inner.nrows());
-    let Some(cholesky) = nalgebra::Cholesky::new(held) else { return Vec::new() };
-    let eigen = SymmetricEigen::new(outer - cross * cholesky.solve(&cross.transpose()));
-    let open = eigen.eigenvalues.iter().enumerate().filter(|(_, v)| **v <= floor);
-    open.map(|(i, _)| {
-        let mut vector = DVector::zeros(len);
-        rest.iter().enumerate().for_each(|(a, at)| vector[*at] = eigen.eigenvectors[(a, i)]);
-        vector
-    })
-    .collect()
 }
