@@ -32,7 +32,7 @@ use information::Information as Info;
 use normal::{Noise, Normal, Tally};
 use solve::{Problem, Solution};
 use source::Sources;
-use unknowns::{Layout, Unknowns};
+use unknowns::{Layout, Role, Unknowns};
 
 /// How to identify.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +86,8 @@ pub fn calibrate_with_progress(
         layout: &layout,
         loss: Loss::default(),
         prior: true,
-        free: layout.of_machine().iter().map(|m| !m).collect(),
+        // As declared: only what nobody has stated is fitted.
+        free: layout.mask(|block| !block.prior),
     };
     progress("finding the set-ups");
     let start = Unknowns::nominal(machine, &sources);
@@ -98,7 +99,7 @@ pub fn calibrate_with_progress(
     problem.prior = prior;
     problem.free = vec![true; layout.len];
     let found = settle(&problem, options.solver, placed.unknowns, noise)?;
-    let information = Info::new(&found.solution.normal.matrix, &layout, prior);
+    let information = Info::new(&found.solution.normal.matrix, &layout, prior, sources.samples());
     let calibrated = calibrated(machine, &sources, &found);
     let fit = fit::report(&problem, &nominal, &found, information, options)?;
     Ok((calibrated, fit))
@@ -123,7 +124,7 @@ pub fn fit_setup(
         layout: &layout,
         loss,
         prior: true,
-        free: layout.of_machine().iter().map(|m| !m).collect(),
+        free: layout.mask(|block| !matches!(block.role, Role::Dyad(_))),
     };
     let mut start = Unknowns::nominal(machine, &sources);
     start.dh = calibrated.deviations().to_vec();
@@ -235,12 +236,12 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
     let sources = &problem.sources.all;
     let free = problem.layout.mask(|_| true);
     let used = if problem.free == free {
-        Info::new(&normal.matrix, problem.layout, problem.prior).used
+        Info::new(&normal.matrix, problem.layout, problem.prior, problem.sources.samples()).used
     } else {
         problem.free.iter().filter(|f| **f).count() as f64
     };
     let kinds: Vec<_> = sources.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
-    let rows: f64 = normal.tallies.iter().map(|t| t.length_weight + t.angle_weight).sum();
+    let rows: f64 = normal.tallies.iter().map(|t| t.inlier_lengths + t.inlier_angles).sum();
     // Every scalar row bears its part of the parameters that are used up.
     let left = (1.0 - used / rows).max(0.05);
     kinds
@@ -254,8 +255,8 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
                 if rows > 0.0 { (sum2 / (rows * left)).sqrt().max(thin::FINEST) } else { present }
             };
             Noise {
-                length: scale(sum.weighted_length2, sum.length_weight, present.length),
-                angle: scale(sum.weighted_angle2, sum.angle_weight, present.angle),
+                length: scale(sum.inlier_length2, sum.inlier_lengths, present.length),
+                angle: scale(sum.inlier_angle2, sum.inlier_angles, present.angle),
             }
         })
         .collect()

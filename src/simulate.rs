@@ -186,14 +186,16 @@ pub fn inverse(
 }
 
 /// A cone in the workpiece, ISO 10791-6 BK4 with a bar of `length` from the workpiece origin to the tool point: half apex angle
-/// 45°, inclined by 30°. The tool's axis stands square to the bar. `count` poses in each sense of travel.
+/// 45°, inclined by 30°. The tool's axis stands at 60° to the bar. `count` poses in each sense of travel.
 pub fn cone(machine: &Machine, length: f64, count: usize) -> Option<Vec<Vec<f64>>> {
     let chain = Chain::nominal(machine);
     let half = 0.5f64;
     let (e, n) = (Vec3([0.0, -half, 0.75f64.sqrt()]), Vec3([0.0, 0.75f64.sqrt(), half]));
     let target = |phi: f64| {
         let m = n.times(phi.cos()) + Vec3([phi.sin(), 0.0, 0.0]);
-        ((e + m).times(length * half.sqrt()), (e - m).times(half.sqrt()))
+        // Square to the bar, then leant towards it by 30°: a bar square to the tool's axis would see fewer combinations.
+        let (bar, square) = ((e + m).times(half.sqrt()), (e - m).times(half.sqrt()));
+        (bar.times(length), square.times(0.75f64.sqrt()) + bar.times(half))
     };
     let (p_w, axis_w) = target(0.0);
     let inside = |q: &[f64]| {

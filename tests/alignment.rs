@@ -134,7 +134,9 @@ fn two_socket_points_leave_the_turn_about_their_line_and_that_is_told() {
     let mut made = 0;
     for (k, start) in random_commands(&machine, 600, 4).iter().enumerate() {
         let socket = Vec3([0.05 * (k % 2) as f64, 0.0, 0.0]);
-        let target = m_from_w.transform(socket);
+        // The ball has play in its socket.
+        let play = Vec3([0.0, 1.0, 2.0].map(|c| NOISE * (12.9898 * (3.0 * k as f64 + c)).sin()));
+        let target = m_from_w.transform(socket + play);
         let axis = Vec3([(k as f64).sin(), (k as f64).cos(), 0.7]);
         let axis = axis.times(1.0 / axis.norm());
         let Some(q) = kincal::simulate::inverse(&chain, &machine, target, axis, start) else { continue };

@@ -36,7 +36,7 @@ impl Rms {
             let sum: f64 = own.iter().map(|t| pick(t).0).sum();
             (samples > 0).then(|| (sum / samples as f64).sqrt())
         };
-        Rms { m: mean(|t| (t.length2, t.length_weight)), rad: mean(|t| (t.angle2, t.angle_weight)) }
+        Rms { m: mean(|t| (t.length2, t.inlier_lengths)), rad: mean(|t| (t.angle2, t.inlier_angles)) }
     }
 }
 
@@ -227,7 +227,7 @@ pub(super) fn report(
         .collect();
     let readings: u64 = sources.all.iter().map(|s| s.summary.samples * s.sensor.reading_count() as u64).sum();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
-    let rank_in_general = Information::new(&general, layout, problem.prior).rank;
+    let rank_in_general = Information::new(&general, layout, problem.prior, 0).rank;
     let suspects = suspects(problem, found)?;
     let fit = Fit {
         machine: machine.name().into(),

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::unknowns::Layout;
+use super::unknowns::{Layout, Role};
 
 /// Eigenvalues of the scaled information below this part of the largest are rounding: not seen.
 pub(crate) const SEEN: f64 = 1e-12;
@@ -36,8 +36,8 @@ impl Information {
         self.strength[i] / (1.0 + self.strength[i])
     }
 
-    /// From the data's matrix in m and rad; `prior` says whether the blocks' priors count.
-    pub(crate) fn new(matrix: &DMatrix<f64>, layout: &Layout, prior: bool) -> Self {
+    /// From the data's matrix in m and rad over so many samples; `prior` says whether the blocks' priors count.
+    pub(crate) fn new(matrix: &DMatrix<f64>, layout: &Layout, prior: bool, samples: u64) -> Self {
         let scales = layout.scales();
         let scaled = DMatrix::from_fn(layout.len, layout.len, |a, b| matrix[(a, b)] * scales[a] * scales[b]);
         let has_prior = layout.mask(|b| b.prior);
@@ -65,26 +65,24 @@ impl Information {
         );
         let directions = DMatrix::from_fn(order.len(), order.len(), |a, i| eigen.eigenvectors[(a, order[i])]);
 
-        // (28): posterior covariance, and what neither data nor prior hold.
+        // (28): posterior covariance, infinite along what neither data nor prior hold.
+        let open = open_directions(&outer, &cross, &inner, &rest, &least(layout, samples, largest));
         let mut full = scaled;
         if prior {
             positions.iter().for_each(|i| full[(*i, *i)] += 1.0);
         }
         let eigen = SymmetricEigen::new(full);
-        let loose = if prior { OPEN.max(3e-15 * largest) } else { floor };
         let mut variance = DVector::zeros(layout.len);
-        let mut open = Vec::new();
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            let held = *value > loose;
+            let is_open = open.iter().map(|o| o.dot(&vector).powi(2)).sum::<f64>() > 0.5;
+            let unheld = is_open || !prior && *value <= floor;
             for (a, x) in vector.iter().enumerate() {
-                if held {
-                    variance[a] += x * x / value;
+                if !unheld {
+                    // The prior's own information is a floor that rounding must not undercut.
+                    variance[a] += x * x / if prior { value.max(1.0) } else { *value };
                 } else if x.abs() > 1e-4 {
                     variance[a] = f64::INFINITY;
                 }
-            }
-            if !held && rest.iter().any(|i| vector[*i].abs() > 0.1) {
-                open.push(vector.into_owned());
             }
         }
         let used =
@@ -103,4 +101,42 @@ fn pseudo_inverse(matrix: &DMatrix<f64>, largest: f64) -> DMatrix<f64> {
     let eigen = SymmetricEigen::new(matrix.clone());
     let inverse = eigen.eigenvalues.map(|v| if v > SEEN * largest { 1.0 / v } else { 0.0 });
     &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
+}
+
+/// The least information that counts for each unknown. About an axis that its points do not leave, a frame seems to be seen through
+/// the noise of the points themselves: as much as one square radian per two readings. Ten times that is asked for.
+fn least(layout: &Layout, samples: u64, largest: f64) -> DVector<f64> {
+    let mut least = DVector::from_element(layout.len, OPEN.max(2e-15 * largest));
+    for block in layout.blocks.iter().filter(|b| matches!(b.role, Role::Setup(_))) {
+        for k in 3..6 {
+            let through_noise = 20.0 * samples as f64 * block.scale[k].powi(2);
+            least[block.offset + k] = least[block.offset + k].max(through_noise);
+        }
+    }
+    least
+}
+
+/// Directions among the unknowns without prior whose information is below the `least` that counts, everything else held by data and prior.
+fn open_directions(
+    outer: &DMatrix<f64>,
+    cross: &DMatrix<f64>,
+    inner: &DMatrix<f64>,
+    rest: &[usize],
+    least: &DVector<f64>,
+) -> Vec<DVector<f64>> {
+    if rest.is_empty() {
+        return Vec::new();
+    }
+    let held = inner + DMatrix::identity(inner.nrows(), inner.nrows());
+    let Some(cholesky) = nalgebra::Cholesky::new(held) else { return Vec::new() };
+    let eigen = SymmetricEigen::new(outer - cross * cholesky.solve(&cross.transpose()));
+    let directions = eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter());
+    directions
+        .filter_map(|(direction, value)| {
+            let mut vector = DVector::zeros(least.len());
+            rest.iter().zip(direction.iter()).for_each(|(at, x)| vector[*at] = *x);
+            let limit: f64 = vector.iter().zip(least).map(|(x, least)| x * x * least).sum();
+            (*value <= limit).then_some(vector)
+        })
+        .collect()
 }
