@@ -43,10 +43,11 @@ pub fn demo(seed: u64) -> Result<Demo> {
     let header = [format!("nominal_length[m]: {BAR}")];
     let (mut texts, mut recordings) = (Vec::new(), Vec::new());
     for degrees in [10u8, 30] {
-        let path = cone(&machine, BAR, f64::from(degrees).to_radians(), 900).ok_or_else(|| Error::Undetermined {
-            what: format!("the reference machine does not reach the cone inclined by {degrees}°"),
-            mend: String::new(),
-        })?;
+        let path =
+            cone(&machine, BAR, f64::from(degrees).to_radians(), 900).ok_or_else(|| Error::Undetermined {
+                what: format!("the reference machine does not reach the cone inclined by {degrees}°"),
+                mend: String::new(),
+            })?;
         let noise_seed = seed.wrapping_add(u64::from(degrees));
         let text = recording(&truth, &instrument, &path, &header, noise_seed);
         let name = format!("bk4_{degrees}deg.csv");

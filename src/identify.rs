@@ -86,6 +86,7 @@ pub fn calibrate_with_progress(
         layout: &layout,
         loss: Loss::default(),
         prior: true,
+        progress,
         // As declared: only what nobody has stated is fitted.
         free: layout.mask(|block| !block.prior),
     };
@@ -94,7 +95,6 @@ pub fn calibrate_with_progress(
     let (placed, noise) = place(&problem, start)?;
     let nominal = placed.normal.tallies.clone();
 
-    progress("identifying the machine");
     problem.loss = options.loss;
     problem.prior = prior;
     problem.free = vec![true; layout.len];
@@ -124,6 +124,7 @@ pub fn fit_setup(
         layout: &layout,
         loss,
         prior: true,
+        progress: &|_| {},
         free: layout.mask(|block| !matches!(block.role, Role::Dyad(_))),
     };
     let mut start = Unknowns::nominal(machine, &sources);
@@ -198,7 +199,8 @@ fn place(problem: &Problem, mut start: Unknowns) -> Result<(Solution, Vec<Noise>
     align::align(machine, sources, &thin, &mut start);
     let mut noise = thin::robust_noise(machine, sources, &thin, &start);
     let mut solution = problem.solve(Solver::LevenbergMarquardt, start, &noise)?;
-    for _ in 0..3 {
+    let rounds = if problem.free.contains(&true) { 3 } else { 0 };
+    for _ in 0..rounds {
         noise = thin::robust_noise(machine, sources, &thin, &solution.unknowns);
         solution = problem.solve(Solver::LevenbergMarquardt, solution.unknowns, &noise)?;
     }
@@ -215,7 +217,7 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
         seen = noise_left(problem, &solution.normal, &noise);
         let next = with_stated(problem.sources, &seen);
         let changed = noise.iter().zip(&next).any(|(a, b)| {
-            let differs = |x: f64, y: f64| (x - y).abs() > 1e-3 * y;
+            let differs = |x: f64, y: f64| (x - y).abs() > 3e-3 * y;
             differs(a.length, b.length) || differs(a.angle, b.angle)
         });
         if !changed {

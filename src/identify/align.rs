@@ -230,10 +230,9 @@ fn best_frame(
         }
     }
     let count = pairs.len().max(1) as f64;
-    let mean = |pick: &dyn Fn(&(Vec3<f64>, Vec3<f64>)) -> Vec3<f64>| {
-        pairs.iter().fold(Vec3([0.0; 3]), |sum, p| sum + pick(p)).times(1.0 / count)
-    };
-    let (mean_w, mean_m) = (mean(&|p| p.0), mean(&|p| p.1));
+    let (sum_w, sum_m) =
+        pairs.iter().fold((Vec3([0.0; 3]), Vec3([0.0; 3])), |(w, m), (p_w, p_m)| (w + *p_w, m + *p_m));
+    let (mean_w, mean_m) = (sum_w.times(1.0 / count), sum_m.times(1.0 / count));
     let mut covariance = Matrix3::zeros();
     for (p_w, p_m) in &pairs {
         covariance += Vector3::from(*p_m - mean_m) * Vector3::from(*p_w - mean_w).transpose();
