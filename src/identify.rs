@@ -22,6 +22,8 @@ pub(crate) use normal::Evaluator;
 pub use solve::{Solver, Stop};
 pub(crate) use source::channel;
 
+use serde::Serialize;
+
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
 use crate::lie::Twist;
@@ -175,6 +177,52 @@ fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &
         calibrated.lengths.retain(|(known, _)| *known != sources.setups[*s]);
         calibrated.lengths.push((setup(*s), *value));
     }
+}
+
+/// What recordings can tell, before anything is identified.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reach {
+    /// Independent combinations of all unknowns that these recordings see.
+    pub rank: usize,
+    /// Combinations that the same instruments would see on general poses.
+    pub rank_in_general: usize,
+    /// Unknowns in all: six per dyad and set-up, and what the recordings declare unknown.
+    pub unknowns: usize,
+    /// Samples used.
+    pub samples: u64,
+    /// Rows left out because a number was missing.
+    pub dropped: u64,
+    /// RMS of the residuals with the machine as declared.
+    pub nominal: Rms,
+}
+
+/// How many combinations of the unknowns these recordings see, at the machine as declared.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
+    let sources = Sources::new(recordings, machine, &|_| {})?;
+    enough_to_start(machine, &sources)?;
+    let layout = Layout::new(machine, &sources);
+    let problem = Problem {
+        machine,
+        sources: &sources,
+        layout: &layout,
+        loss: Loss::default(),
+        prior: true,
+        progress: &|_| {},
+        free: layout.mask(|block| !block.prior),
+    };
+    let (placed, _) = place(&problem, Unknowns::nominal(machine, &sources))?;
+    let general = normal::matrix_in_general(machine, &sources, &layout, &placed.unknowns);
+    Ok(Reach {
+        rank: Info::new(&placed.normal.matrix, &layout, true, sources.samples()).rank,
+        rank_in_general: Info::new(&general, &layout, true, 0).rank,
+        unknowns: layout.len,
+        samples: sources.samples(),
+        dropped: sources.all.iter().map(|s| s.summary.dropped).sum(),
+        nominal: Rms::over(&placed.normal.tallies),
+    })
 }
 
 /// A solution and the noise that it was weighted with.

@@ -55,7 +55,9 @@ fn one_entry_a_line(text: &str) -> String {
     for line in text.split_inclusive('\n') {
         let list = line.starts_with("        ").then(|| line.split_once(": [(")).flatten();
         match list.and_then(|(field, rest)| Some((field, rest.trim_end().strip_suffix(")],")?))) {
-            Some((field, entries)) if field.trim_start().chars().all(|c| c.is_ascii_lowercase() || c == '_') => {
+            Some((field, entries))
+                if field.trim_start().chars().all(|c| c.is_ascii_lowercase() || c == '_') =>
+            {
                 let entries = entries.replace("), (", "),\n            (");
                 out.push_str(&format!("{field}: [\n            ({entries}),\n        ],\n"));
             }
