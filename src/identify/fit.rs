@@ -36,7 +36,7 @@ impl Rms {
             let sum: f64 = own.iter().map(|t| pick(t).0).sum();
             (samples > 0).then(|| (sum / samples as f64).sqrt())
         };
-        Rms { m: mean(|t| (t.length2, t.length_weight)), rad: mean(|t| (t.angle2, t.angle_weight)) }
+        Rms { m: mean(|t| (t.length2, t.inlier_lengths)), rad: mean(|t| (t.angle2, t.inlier_angles)) }
     }
 }
 
@@ -227,7 +227,7 @@ pub(super) fn report(
         .collect();
     let readings: u64 = sources.all.iter().map(|s| s.summary.samples * s.sensor.reading_count() as u64).sum();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
-    let rank_in_general = Information::new(&general, layout, problem.prior).rank;
+    let rank_in_general = Information::new(&general, layout, problem.prior, 0).rank;
     let suspects = suspects(problem, found)?;
     let fit = Fit {
         machine: machine.name().into(),
@@ -396,6 +396,11 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
             warnings.push(format!("{}: {warning}", source.recording.name()));
         }
     }
+    if clocks_overlap(problem) {
+        warnings.push(
+            "recordings overlap in time: `t` must run on one clock for all of them before drift or slips can be told".into(),
+        );
+    }
     // (22)
     let needed = fit.rank.max(1) as u64;
     if fit.readings < 5 * needed {
@@ -429,6 +434,13 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
         warnings.push("the number of steps was used up before the fit settled".into());
     }
     warnings
+}
+
+/// Whether two recordings claim the same time.
+fn clocks_overlap(problem: &Problem) -> bool {
+    let mut spans: Vec<(f64, f64)> = problem.sources.all.iter().filter_map(|s| s.summary.time).collect();
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    spans.windows(2).any(|pair| pair[1].0 < pair[0].1)
 }
 
 /// Which joints stand still, as the end of a sentence.

@@ -37,11 +37,11 @@ pub(crate) struct Tally {
     pub length2: f64,
     /// Sum of squared angles, rad², unweighted.
     pub angle2: f64,
-    /// Weighted sums of squares and the numbers of scalar rows they are over.
-    pub weighted_length2: f64,
-    pub weighted_angle2: f64,
-    pub length_weight: f64,
-    pub angle_weight: f64,
+    /// Sums of squares over samples that count, and the numbers of scalar rows they are over.
+    pub inlier_length2: f64,
+    pub inlier_angle2: f64,
+    pub inlier_lengths: f64,
+    pub inlier_angles: f64,
     /// Samples whose weight is below one half.
     pub down_weighted: u64,
 }
@@ -51,10 +51,10 @@ impl Tally {
         self.samples += o.samples;
         self.length2 += o.length2;
         self.angle2 += o.angle2;
-        self.weighted_length2 += o.weighted_length2;
-        self.weighted_angle2 += o.weighted_angle2;
-        self.length_weight += o.length_weight;
-        self.angle_weight += o.angle_weight;
+        self.inlier_length2 += o.inlier_length2;
+        self.inlier_angle2 += o.inlier_angle2;
+        self.inlier_lengths += o.inlier_lengths;
+        self.inlier_angles += o.inlier_angles;
         self.down_weighted += o.down_weighted;
     }
 }
@@ -69,6 +69,8 @@ pub(crate) struct Normal {
     pub tallies: Vec<Tally>,
 }
 
+/// Samples with a smaller weight say nothing about the noise.
+const COUNTS: f64 = 0.25;
 /// Extra columns of a source behind the six of each dyad: tool point, zero, length.
 const EXTRAS: usize = 5;
 
@@ -250,14 +252,17 @@ fn part(
             whitened[k * count + i] = residual * factor;
             slot[i * width..(i + 1) * width].iter_mut().for_each(|x| *x *= factor);
             let angle = count == 6 && i >= 3 || count == 1 && source_is_angle(source, evaluator.machine);
-            let (sum, weighted, weights) = if angle {
-                (&mut tally.angle2, &mut tally.weighted_angle2, &mut tally.angle_weight)
+            let (sum, inliers, counted) = if angle {
+                (&mut tally.angle2, &mut tally.inlier_angle2, &mut tally.inlier_angles)
             } else {
-                (&mut tally.length2, &mut tally.weighted_length2, &mut tally.length_weight)
+                (&mut tally.length2, &mut tally.inlier_length2, &mut tally.inlier_lengths)
             };
             *sum += residual * residual;
-            *weighted += weight * residual * residual;
-            *weights += weight;
+            // The noise is that of the samples that the model claims to describe.
+            if weight > COUNTS {
+                *inliers += residual * residual;
+                *counted += 1.0;
+            }
         }
     }
     let matrix = &rows * rows.transpose();
