@@ -296,10 +296,8 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
     let left = (1.0 - used / rows).max(0.05);
     kinds
         .iter()
-        .zip(sources)
         .zip(present)
-        .map(|((kind, source), present)| {
-            let left = left * problem.loss.consistency(source.sensor.reading_count());
+        .map(|(kind, present)| {
             let mut sum = Tally::default();
             let own = kinds.iter().zip(&normal.tallies).filter(|(k, _)| *k == kind);
             own.for_each(|(_, tally)| sum.add(tally));

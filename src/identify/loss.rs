@@ -42,46 +42,11 @@ impl Loss {
             }
         }
     }
-
-    /// `E[w e²] / E[w]` on clean normal noise of unit size, with `readings` readings a sample: weights take away from the tails of
-    /// clean data too, and noise taken from weighted squares must be set right by this.
-    pub(crate) fn consistency(self, readings: usize) -> f64 {
-        if self == Loss::Squares || readings == 0 {
-            return 1.0;
-        }
-        // The norm of a sample's readings has the density r^(n-1) exp(-r²/2) up to a factor, which cancels.
-        const STEP: f64 = 0.01;
-        let (mut weighted, mut weights) = (0.0, 0.0);
-        for i in 0..1200 {
-            let r = STEP * (f64::from(i) + 0.5);
-            let e2 = r * r / readings as f64;
-            let share = self.at(e2).1 * r.powi(readings as i32 - 1) * (-0.5 * r * r).exp();
-            weighted += share * e2;
-            weights += share;
-        }
-        weighted / weights
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn consistency_agrees_with_closed_forms() {
-        // Tukey's weight is a polynomial inside c, and moments of the normal are 1, 3, 15 (readings 1) as long as c is far out.
-        let c: f64 = 12.0;
-        let (c2, c4) = (c.powi(2), c.powi(4));
-        let closed = (1.0 - 6.0 / c2 + 15.0 / c4) / (1.0 - 2.0 / c2 + 3.0 / c4);
-        assert!((Loss::Tukey { c }.consistency(1) - closed).abs() < 1e-9);
-        // A far corner takes nothing away, however many readings.
-        for readings in [1, 3, 6] {
-            assert!((Loss::Huber { k: 9.0 }.consistency(readings) - 1.0).abs() < 1e-9);
-        }
-        // Huber, one reading: E[w e²] is what the normal has inside the corner, 0.82138 at 1.345, and E[w] lies between that and 1.
-        let huber = Loss::Huber { k: 1.345 }.consistency(1);
-        assert!((0.82138..1.0).contains(&huber), "{huber}");
-    }
 
     #[test]
     fn weight_is_the_derivative_of_the_loss_by_half_the_square() {
