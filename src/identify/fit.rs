@@ -14,6 +14,8 @@ use crate::units::Quantity;
 
 /// Names of a twist's components in the order (v; w).
 pub const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
+/// Deviations beyond so many tolerances are told.
+const CONTRADICTED: f64 = 5.0;
 /// Down-weighted samples that are listed one by one; all are counted.
 const LISTED: usize = 50;
 
@@ -340,6 +342,15 @@ fn in_words(problem: &Problem, vector: &DVector<f64>) -> String {
     let mut parts: Vec<(f64, &str)> =
         vector.iter().zip(&labels).filter(|(x, _)| x.abs() > 0.1).map(|(x, l)| (*x, l.as_str())).collect();
     parts.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    if let [(_, label)] = parts[..]
+        && let Some((owner, component)) = label.rsplit_once('.')
+    {
+        let axis = &component[component.len() - 1..];
+        return match component.as_bytes()[0] {
+            b'w' => format!("the turn of {owner} about its {axis} axis"),
+            _ => format!("the place of {owner} along its {axis} axis"),
+        };
+    }
     let named: Vec<String> = parts.iter().take(4).map(|(x, l)| format!("{x:+.2} {l}")).collect();
     named.join(" ")
 }
@@ -419,6 +430,21 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     }
     for open in &fit.open {
         warnings.push(format!("not seen by the recordings, left as declared: {open}"));
+    }
+    // A tolerance that the data contradict pulls at everything else.
+    let contradicted = fit.parameters.iter().filter(|p| p.value.abs() > CONTRADICTED * p.tolerance);
+    let mut frames: Vec<(&str, f64)> = Vec::new();
+    for p in contradicted {
+        let size = p.value.abs() / p.tolerance;
+        match frames.iter_mut().find(|(frame, _)| *frame == p.frame) {
+            Some((_, largest)) => *largest = largest.max(size),
+            None => frames.push((&p.frame, size)),
+        }
+    }
+    for (frame, size) in frames {
+        warnings.push(format!(
+            "frame {frame} lies {size:.0} tolerances from where the machine file has it: check its declaration, or state a larger tolerance there"
+        ));
     }
     for recording in fit.recordings.iter().filter(|r| r.birge.is_some_and(|b| b > 2.0)) {
         warnings.push(format!(

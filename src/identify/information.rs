@@ -66,7 +66,7 @@ impl Information {
         let directions = DMatrix::from_fn(order.len(), order.len(), |a, i| eigen.eigenvectors[(a, order[i])]);
 
         // (28): posterior covariance, infinite along what neither data nor prior hold.
-        let open = open_directions(&outer, &cross, &inner, &rest, &least(layout, samples, largest));
+        let open = open_directions(&outer, &rest, &least(layout, samples, largest));
         let mut full = scaled;
         if prior {
             positions.iter().for_each(|i| full[(*i, *i)] += 1.0);
@@ -116,20 +116,13 @@ fn least(layout: &Layout, samples: u64, largest: f64) -> DVector<f64> {
     least
 }
 
-/// Directions among the unknowns without prior whose information is below the `least` that counts, everything else held by data and prior.
-fn open_directions(
-    outer: &DMatrix<f64>,
-    cross: &DMatrix<f64>,
-    inner: &DMatrix<f64>,
-    rest: &[usize],
-    least: &DVector<f64>,
-) -> Vec<DVector<f64>> {
+/// Directions among the unknowns without prior that the data would not show even on a machine without any deviation: their
+/// information is below the `least` that counts.
+fn open_directions(outer: &DMatrix<f64>, rest: &[usize], least: &DVector<f64>) -> Vec<DVector<f64>> {
     if rest.is_empty() {
         return Vec::new();
     }
-    let held = inner + DMatrix::identity(inner.nrows(), inner.nrows());
-    let Some(cholesky) = nalgebra::Cholesky::new(held) else { return Vec::new() };
-    let eigen = SymmetricEigen::new(outer - cross * cholesky.solve(&cross.transpose()));
+    let eigen = SymmetricEigen::new(outer.clone());
     let directions = eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter());
     directions
         .filter_map(|(direction, value)| {
