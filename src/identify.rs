@@ -13,9 +13,7 @@ mod source;
 mod thin;
 mod unknowns;
 
-pub use fit::{
-    BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, Rms, SetupFit, Suspect,
-};
+pub use fit::{BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, SetupFit, Suspect};
 pub use information::Information;
 pub use loss::Loss;
 pub(crate) use normal::Evaluator;
@@ -29,9 +27,10 @@ use crate::error::{Error, Result};
 use crate::lie::Twist;
 use crate::machine::Machine;
 use crate::recording::Recording;
+use crate::rms::Rms;
 use crate::units::Quantity;
 use information::Information as Info;
-use normal::{Noise, Normal, Tally};
+use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
 use source::Sources;
 use unknowns::{Layout, Role, Unknowns};
@@ -221,7 +220,7 @@ pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
         unknowns: layout.len,
         samples: sources.samples(),
         dropped: sources.all.iter().map(|s| s.summary.dropped).sum(),
-        nominal: Rms::over(&placed.normal.tallies),
+        nominal: normal::rms_over(&placed.normal.tallies),
     })
 }
 
@@ -236,7 +235,7 @@ pub(crate) struct Found {
 impl Found {
     /// Root mean square of residual lengths and angles over all samples, m and rad.
     pub fn rms(&self) -> Rms {
-        Rms::over(&self.solution.normal.tallies)
+        normal::rms_over(&self.solution.normal.tallies)
     }
 }
 
@@ -291,7 +290,7 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
         problem.free.iter().filter(|f| **f).count() as f64
     };
     let kinds: Vec<_> = sources.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
-    let rows: f64 = normal.tallies.iter().map(|t| t.inlier_lengths + t.inlier_angles).sum();
+    let rows = normal.tallies.iter().map(|t| t.length.inliers + t.angle.inliers).sum::<u64>() as f64;
     // Every scalar row bears its part of the parameters that are used up.
     let left = (1.0 - used / rows).max(0.05);
     kinds
@@ -301,13 +300,11 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
             let mut sum = Tally::default();
             let own = kinds.iter().zip(&normal.tallies).filter(|(k, _)| *k == kind);
             own.for_each(|(_, tally)| sum.add(tally));
-            let scale = |sum2: f64, rows: f64, present: f64| {
-                if rows > 0.0 { (sum2 / (rows * left)).sqrt().max(thin::FINEST) } else { present }
+            let scale = |sums: &Sums, present: f64| match sums.inliers {
+                0 => present,
+                n => (sums.inlier_squares / (n as f64 * left)).sqrt().max(thin::FINEST),
             };
-            Noise {
-                length: scale(sum.inlier_length2, sum.inlier_lengths, present.length),
-                angle: scale(sum.inlier_angle2, sum.inlier_angles, present.angle),
-            }
+            Noise { length: scale(&sum.length, present.length), angle: scale(&sum.angle, present.angle) }
         })
         .collect()
 }

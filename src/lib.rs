@@ -77,6 +77,7 @@ pub mod lie;
 pub mod machine;
 pub mod predict;
 pub mod recording;
+mod rms;
 mod scalar;
 pub mod sensor;
 pub mod simulate;
@@ -86,6 +87,7 @@ pub use calibration::CalibratedMachine;
 pub use chain::{Chain, Sweep};
 pub use error::{Error, Place, Result};
 pub use machine::Machine;
+pub use rms::Rms;
 pub use scalar::Scalar;
 
 /// The README's examples run as tests.

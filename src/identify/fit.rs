@@ -3,13 +3,13 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::normal::{Tally, matrix_in_general, sigmas, standardised};
+use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
 use super::solve::Problem;
 use super::unknowns::{Block, Role};
 use super::{Evaluator, Found, Information, Loss, Options, Solver, Stop};
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::sensor::Sensor;
+use crate::rms::Rms;
 use crate::units::Quantity;
 
 /// Names of a twist's components in the order (v; w).
@@ -18,29 +18,6 @@ pub const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 const CONTRADICTED: f64 = 5.0;
 /// Down-weighted samples that are listed one by one; all are counted.
 const LISTED: usize = 50;
-
-/// Root mean square of the residuals' Euclidean norm over samples; `None` where nothing of the kind was measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Rms {
-    /// Of lengths, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub m: Option<f64>,
-    /// Of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rad: Option<f64>,
-}
-
-impl Rms {
-    pub(crate) fn over(tallies: &[Tally]) -> Self {
-        let mean = |pick: fn(&Tally) -> (f64, f64)| {
-            let own: Vec<&Tally> = tallies.iter().filter(|t| pick(t).1 > 0.0).collect();
-            let samples: u64 = own.iter().map(|t| t.samples).sum();
-            let sum: f64 = own.iter().map(|t| pick(t).0).sum();
-            (samples > 0).then(|| (sum / samples as f64).sqrt())
-        };
-        Rms { m: mean(|t| (t.length2, t.inlier_lengths)), rad: mean(|t| (t.angle2, t.inlier_angles)) }
-    }
-}
 
 /// Everything that an identification has to say. Numbers in SI.
 #[derive(Clone, Debug, Serialize)]
@@ -187,17 +164,6 @@ pub struct Suspect {
     pub weight: f64,
 }
 
-/// Name of a measurement as recordings spell it.
-pub(crate) fn measurement_name(sensor: &Sensor) -> &'static str {
-    match sensor {
-        Sensor::Distance { .. } => "distance",
-        Sensor::Position => "position",
-        Sensor::Pose => "pose",
-        Sensor::Displacement { .. } => "displacement",
-        Sensor::Joint { .. } => "joint",
-    }
-}
-
 pub(super) fn report(
     problem: &Problem,
     nominal: &[Tally],
@@ -207,7 +173,7 @@ pub(super) fn report(
 ) -> Result<Fit> {
     let (machine, sources, layout) = (problem.machine, problem.sources, problem.layout);
     let tallies = &found.solution.normal.tallies;
-    let (before, after) = (Rms::over(nominal), Rms::over(tallies));
+    let (before, after) = (rms_over(nominal), rms_over(tallies));
     let pair =
         |before: Option<f64>, after: Option<f64>| Some(BeforeAfter { nominal: before?, geometric: after? });
     let recordings = (sources.all.iter().enumerate())
@@ -217,11 +183,11 @@ pub(super) fn report(
             RecordingFit {
                 name: source.recording.name().to_string(),
                 setup: sources.setups[source.setup].clone(),
-                measurement: measurement_name(&source.sensor).into(),
+                measurement: source.sensor.name().into(),
                 samples: source.summary.samples,
                 dropped: source.summary.dropped,
-                nominal: Rms::over(&nominal[i..=i]),
-                geometric: Rms::over(&tallies[i..=i]),
+                nominal: rms_over(&nominal[i..=i]),
+                geometric: rms_over(&tallies[i..=i]),
                 sigma: pick(&found.noise[i]),
                 birge: source.recording.header().sigma.map(|s| pick(&found.seen[i]) / s.value),
             }
