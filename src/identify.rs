@@ -27,7 +27,7 @@ use crate::error::{Error, Result};
 use crate::lie::Twist;
 use crate::machine::Machine;
 use crate::recording::Recording;
-use crate::rms::Rms;
+pub use crate::rms::Rms;
 use crate::units::Quantity;
 use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};

@@ -87,7 +87,6 @@ pub use calibration::CalibratedMachine;
 pub use chain::{Chain, Sweep};
 pub use error::{Error, Place, Result};
 pub use machine::Machine;
-pub use rms::Rms;
 pub use scalar::Scalar;
 
 /// The README's examples run as tests.
