@@ -57,7 +57,7 @@ const NOISE_ROUNDS: usize = 12;
 /// Identifies the deviations of `machine` from recordings, which may differ in kind and set-up.
 ///
 /// # Errors
-/// If a recording cannot be read, no joint moves, or there are fewer readings than a fit needs.
+/// If a recording cannot be read, no joint moves, or there are no more readings than the set-ups alone need.
 pub fn calibrate(
     machine: &Machine,
     recordings: &[Recording],
@@ -78,7 +78,20 @@ pub fn calibrate_with_progress(
 ) -> Result<(CalibratedMachine, Fit)> {
     let sources = Sources::new(recordings, machine, progress)?;
     enough_to_start(machine, &sources)?;
+    enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources);
+    let alone: usize = layout.blocks.iter().filter(|b| !b.prior).map(|b| b.len).sum();
+    if sources.readings() <= alone as u64 {
+        return Err(Error::Undetermined {
+            what: format!(
+                "{} scalar readings for {alone} unknowns of the set-ups: nothing is left to identify the machine from",
+                sources.readings()
+            ),
+            mend:
+                "record more poses, or declare what is known of the set-up (frame, tool point, zero, length)"
+                    .into(),
+        });
+    }
     let prior = options.prior && options.solver.uses_prior();
     let mut problem = Problem {
         machine,
@@ -116,6 +129,7 @@ pub fn fit_setup(
 ) -> Result<CalibratedMachine> {
     let machine = calibrated.machine();
     let sources = Sources::new(recordings, machine, &|_| {})?;
+    enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources);
     let problem = Problem {
         machine,
@@ -298,6 +312,42 @@ fn enough_to_start(machine: &Machine, sources: &Sources) -> Result<()> {
             what: "no joint moves in any recording: nothing of the machine can be identified".into(),
             mend: "record while the joints move through their travel".into(),
         });
+    }
+    Ok(())
+}
+
+/// Refuses set-ups and tool points that have fewer readings than unknowns of their own.
+fn enough_for_setups(sources: &Sources) -> Result<()> {
+    let readings = |pick: &dyn Fn(&source::Source) -> bool| -> u64 {
+        sources.all.iter().filter(|s| pick(s)).map(source::Source::readings).sum()
+    };
+    let mend = || "record more poses with this set-up, or declare what is known of it".to_string();
+    for (setup, name) in sources.setups.iter().enumerate() {
+        let frame = if sources.frame_unknown[setup] { 6 } else { 0 };
+        let lengths = sources.lengths.iter().filter(|s| **s == setup).count() as u64;
+        let needed = frame + lengths;
+        let has = readings(&|s| s.setup == setup && s.sees_frames());
+        if needed > 0 && has < needed {
+            let name = if name.is_empty() { "the set-up".into() } else { format!("set-up \"{name}\"") };
+            let of = match (frame > 0, lengths > 0) {
+                (true, true) => "frame w and length",
+                (true, false) => "frame w",
+                (false, _) => "length",
+            };
+            return Err(Error::Undetermined {
+                what: format!("{has} scalar readings for the {needed} unknowns of {name} ({of})"),
+                mend: mend(),
+            });
+        }
+    }
+    for (point, name) in sources.tool_points.iter().enumerate() {
+        let has = readings(&|s| s.tool_point.unknown() == Some(point) && s.sees_frames());
+        if (1..3).contains(&has) {
+            return Err(Error::Undetermined {
+                what: format!("{has} scalar readings for the 3 coordinates of tool point \"{name}\""),
+                mend: mend(),
+            });
+        }
     }
     Ok(())
 }

@@ -154,8 +154,12 @@ fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Re
         Some(chain) => Ok(chain),
         None if header.workpiece_frame_unknown && !matches!(sensor, Sensor::Joint { .. }) => {
             let known: Vec<&str> = calibrated.setup_names().collect();
+            let setup = match header.setup.as_str() {
+                "" => "the set-up".to_string(),
+                name => format!("set-up \"{name}\""),
+            };
             Err(missing(
-                format!("where set-up \"{}\" stands is not in the calibrated file", header.setup),
+                format!("where {setup} of this recording stands is not in the calibrated file"),
                 &known,
             ))
         }
@@ -164,11 +168,10 @@ fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Re
 }
 
 fn missing(what: String, known: &[&str]) -> Error {
-    let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
-    Error::Undetermined {
-        what,
-        mend: format!("add --fit-setup to find it from this recording; the file knows: {known}"),
-    }
+    let known: Vec<&str> = known.iter().copied().filter(|name| !name.is_empty()).collect();
+    let known =
+        if known.is_empty() { String::new() } else { format!("; the file knows: {}", known.join(", ")) };
+    Error::Undetermined { what, mend: format!("add --fit-setup to find it from this recording{known}") }
 }
 
 fn sensor_state(

@@ -225,7 +225,7 @@ pub(super) fn report(
             }
         })
         .collect();
-    let readings: u64 = sources.all.iter().map(|s| s.summary.samples * s.sensor.reading_count() as u64).sum();
+    let readings = sources.readings();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
     let rank_in_general = Information::new(&general, layout, problem.prior).rank;
     let suspects = suspects(problem, found)?;
@@ -415,15 +415,27 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     for open in &fit.open {
         warnings.push(format!("not seen by the recordings, left as declared: {open}"));
     }
-    for recording in fit.recordings.iter().filter(|r| r.birge.is_some_and(|b| b > 2.0)) {
+    // Recordings of one kind share their noise, and often the figure: one sentence for all of them.
+    let mut above: Vec<(String, Vec<&str>)> = Vec::new();
+    for recording in &fit.recordings {
+        let Some(birge) = recording.birge.filter(|b| *b > 2.0) else { continue };
+        let figure = format!("{birge:.1}");
+        match above.iter_mut().find(|(known, _)| *known == figure) {
+            Some((_, names)) => names.push(&recording.name),
+            None => above.push((figure, vec![&recording.name])),
+        }
+    }
+    for (figure, names) in above {
         warnings.push(format!(
-            "{}: residuals are {:.1} times the stated sigma: something besides constant geometry is at work",
-            recording.name,
-            recording.birge.unwrap_or(1.0)
+            "{}: residuals are {figure} times the stated sigma: something besides constant geometry is at work",
+            names.join(", ")
         ));
     }
     if fit.down_weighted > 0 {
-        warnings.push(format!("{} samples count less than half because they lie far off", fit.down_weighted));
+        warnings.push(match fit.down_weighted {
+            1 => "1 sample counts less than half because it lies far off".into(),
+            n => format!("{n} samples count less than half because they lie far off"),
+        });
     }
     if fit.stop == Stop::Steps && !matches!(fit.solver, Solver::FixedDamping { .. }) {
         warnings.push("the number of steps was used up before the fit settled".into());
