@@ -244,7 +244,7 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
     Ok(Found { solution, noise, seen })
 }
 
-/// Noise of every source from the residuals of its kind, freed of the parameters that the fit used up.
+/// Noise of every source from the residuals of its kind and stated `sigma`, freed of the parameters that the fit used up.
 fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Noise> {
     let sources = &problem.sources.all;
     let free = problem.layout.mask(|_| true);
@@ -253,7 +253,7 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
     } else {
         problem.free.iter().filter(|f| **f).count() as f64
     };
-    let kinds: Vec<_> = sources.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
+    let kinds: Vec<_> = sources.iter().map(source::Source::noise_group).collect();
     let rows: f64 = normal.tallies.iter().map(|t| t.length_weight + t.angle_weight).sum();
     // Every scalar row bears its part of the parameters that are used up.
     let left = (1.0 - used / rows).max(0.05);

@@ -174,3 +174,53 @@ fn warnings_of_the_reader_come_along_with_the_name_of_the_file() {
     let fit = case.fit(case.text());
     assert_warns(&fit, "case.csv: line 4: ignored header key `operator`");
 }
+
+#[test]
+fn instruments_of_one_kind_with_different_sigma_keep_their_own_noise() {
+    let fine = Case::new("xyz_mill", Sensor::Position, 200);
+    let mut coarse = Case::new("xyz_mill", Sensor::Position, 200);
+    coarse.instrument.noise_m = 1e-4;
+    let with = |case: &mut Case, sigma: &str| {
+        case.header.push(format!("sigma[um]: {sigma}"));
+        Recording::from_bytes("r.csv", case.text().into_bytes(), &case.machine)
+            .unwrap_or_else(|e| panic!("{e}"))
+    };
+    let (mut fine, machine) = (fine, coarse.machine.clone());
+    let recordings = [with(&mut fine, "1"), with(&mut coarse, "100")];
+    let (_, fit) = calibrate(&machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
+    for (recording, sigma) in fit.recordings.iter().zip([1e-6, 1e-4]) {
+        assert!((0.9..1.2).contains(&(recording.sigma / sigma)), "{} m, stated {sigma} m", recording.sigma);
+        assert!(recording.birge.is_some_and(|b| (0.8..1.2).contains(&b)), "{:?}", recording.birge);
+    }
+}
+
+#[test]
+fn a_ballbar_of_unknown_length_is_found_from_nothing() {
+    for unknown_frame in [false, true] {
+        let mut case = Case::new("xyz_mill", Sensor::Distance { absolute: false }, 300);
+        // On a sphere about the centre: the reading hardly varies.
+        case.commands.iter_mut().for_each(|q| {
+            let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+            q.iter_mut().for_each(|x| *x *= 0.1 / norm);
+        });
+        case.instrument.state.tool_point_t = Vec3([0.0; 3]);
+        case.instrument.state.length = 0.0998;
+        case.header = vec!["nominal_length: unknown".into()];
+        if unknown_frame {
+            case.header.push("workpiece_frame: unknown".into());
+        }
+        let recordings = [Recording::from_bytes("bar.csv", case.text().into_bytes(), &case.machine)
+            .unwrap_or_else(|e| panic!("{e}"))];
+        let (calibrated, fit) =
+            calibrate(&case.machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
+        let (_, length) = calibrated.lengths().next().expect("a length");
+        let rms = fit.rms_m.expect("lengths");
+        println!(
+            "unknown frame {unknown_frame}: length {length}, rms {rms:?}, {} steps {}",
+            fit.steps, fit.stop
+        );
+        assert!(rms.geometric < 1.1e-6, "{rms:?}");
+        assert!((length - 0.0998).abs() < 1e-5, "{length}");
+        assert!(fit.steps < 30, "{}", fit.steps);
+    }
+}

@@ -354,11 +354,12 @@ pub(crate) fn table(indent: &str, right: &[bool], rows: &[Vec<String>]) -> Strin
     let mut text = String::new();
     for row in rows {
         let mut line = indent.to_string();
-        for (c, cell) in row.iter().enumerate() {
+        for (c, cell) in row.iter().enumerate().filter(|(c, _)| widths[*c] > 0) {
             let gap = " ".repeat(widths[c] - cell.chars().count());
-            let (before, after) =
-                if right.get(c) == Some(&true) { (gap, String::new()) } else { (String::new(), gap) };
-            line.push_str(&format!("{}{before}{cell}{after}", if c == 0 { "" } else { "  " }));
+            let padded =
+                if right.get(c) == Some(&true) { format!("{gap}{cell}") } else { format!("{cell}{gap}") };
+            line.push_str(if c == 0 { "" } else { "  " });
+            line.push_str(&padded);
         }
         text.push_str(line.trim_end());
         text.push('\n');

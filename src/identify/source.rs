@@ -60,6 +60,12 @@ impl Source<'_> {
         self.sensor.quantity(i, prismatic)
     }
 
+    /// Recordings that share their noise have the same one of these: kind of instrument and stated `sigma`.
+    pub fn noise_group(&self) -> (std::mem::Discriminant<Sensor>, Option<u64>) {
+        let stated = self.recording.header().sigma.map(|s| s.value.to_bits());
+        (std::mem::discriminant(&self.sensor), stated)
+    }
+
     /// Scalar readings in all samples.
     pub fn readings(&self) -> u64 {
         self.summary.samples * self.sensor.reading_count() as u64
