@@ -176,6 +176,15 @@ fn warnings_of_the_reader_come_along_with_the_name_of_the_file() {
 }
 
 #[test]
+fn an_encoder_with_an_arbitrary_zero_says_nothing_about_constant_deviations() {
+    let mut case = Case::new("rotary_axis", Sensor::Joint { dyad: 1 }, 50);
+    case.header = vec!["zero: unknown".into()];
+    assert_warns(&case.fit(case.text()), "no constant deviation of the machine shows in these recordings");
+    case.header.clear();
+    assert!(case.fit(case.text()).warnings.is_empty());
+}
+
+#[test]
 fn instruments_of_one_kind_with_different_sigma_keep_their_own_noise() {
     let fine = Case::new("xyz_mill", Sensor::Position, 200);
     let mut coarse = Case::new("xyz_mill", Sensor::Position, 200);

@@ -144,10 +144,10 @@ fn calibrated(name: &str) -> (Folder, String, String) {
 fn usage_errors_have_status_2_and_help_has_status_0() {
     assert!(fails(2, &[]).contains("Usage: kincal"));
     assert!(fails(2, &["calibrat"]).contains("tip: a similar subcommand exists: 'calibrate'"));
-    assert!(fails(2, &["calibrate", MACHINE]).contains("<RECORDINGS>"));
+    assert!(fails(2, &["calibrate", MACHINE]).contains("<REC.csv>"));
     assert!(fails(2, &["describe", MACHINE, "--jason", "-"]).contains("--json"));
     assert!(
-        fails(2, &["calibrate", MACHINE, "x.csv", "--tuning=-1"]).contains("expected a number above zero")
+        fails(2, &["calibrate", MACHINE, "x.csv", "--tuning", "-1"]).contains("expected a number above zero")
     );
     assert!(fails(2, &["check", MACHINE, "--poses", "0"]).contains("0 is not in"));
     for command in ["describe", "check", "calibrate", "predict", "demo"] {

@@ -38,9 +38,10 @@ enum LossWord {
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Machine file
+    #[arg(value_name = "MACHINE.ron")]
     machine: PathBuf,
     /// Recordings
-    #[arg(required = true)]
+    #[arg(required = true, value_name = "REC.csv")]
     recordings: Vec<PathBuf>,
     /// Where to write the calibrated machine
     #[arg(short, long, value_name = "CALIBRATED.ron")]
@@ -49,19 +50,19 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "lm")]
     solver: SolverWord,
     /// Damping of fixed-damping, relative to the largest diagonal element
-    #[arg(long, default_value_t = 1e-3, value_parser = positive)]
+    #[arg(long, default_value_t = 1e-3, value_parser = positive, allow_negative_numbers = true)]
     tau: f64,
     /// Steps of fixed-damping
     #[arg(long, default_value_t = 30)]
     steps: usize,
     /// Relative singular value below which rank-truncation takes a direction as not seen
-    #[arg(long, default_value_t = 1e-3, value_parser = positive)]
+    #[arg(long, default_value_t = 1e-3, value_parser = positive, allow_negative_numbers = true)]
     cut: f64,
     /// How residuals count
     #[arg(long, value_enum, default_value = "huber")]
     loss: LossWord,
     /// Tuning constant of the loss, standard deviations
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     tuning: Option<f64>,
     /// Do not hold deviations near zero by the tolerances of the machine file
     #[arg(long)]
@@ -140,19 +141,21 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         let _ = write!(text, ", {} left out as drop-outs", count(fit.dropped, "row", "rows"));
     }
     text.push_str("\n\nRMS of the residuals (measured minus model)\n");
-    let words = |words: [&str; 5]| words.map(String::from).to_vec();
-    let mut rows = vec![words(["recording", "measurement", "samples", "as declared", "calibrated"])];
+    let words = |words: [&str; 6]| words.map(String::from).to_vec();
+    let named = fit.recordings.iter().any(|r| !r.setup.is_empty());
+    let setup = if named { "set-up" } else { "" };
+    let mut rows = vec![words(["recording", setup, "measurement", "samples", "as declared", "calibrated"])];
     for r in &fit.recordings {
-        let (name, kind) = (r.name.clone(), r.measurement.clone());
-        rows.push(vec![name, kind, r.samples.to_string(), rms(&r.nominal), rms(&r.geometric)]);
+        let (samples, before, after) = (r.samples.to_string(), rms(&r.nominal), rms(&r.geometric));
+        rows.push(words([&r.name, &r.setup, &r.measurement, &samples, &before, &after]));
     }
     for (pair, kind) in [(fit.rms_m, Kind::Length), (fit.rms_rad, Kind::Angle)] {
         if let Some(pair) = pair.filter(|_| fit.recordings.len() > 1) {
             let [before, after] = [pair.nominal, pair.geometric].map(|x| kind.show(x));
-            rows.push(words(["all", "", "", &before, &after]));
+            rows.push(words(["all", "", "", "", &before, &after]));
         }
     }
-    text.push_str(&table("  ", &[false, false, true, true, true], &rows));
+    text.push_str(&table("  ", &[false, false, false, true, true, true], &rows));
     let _ = writeln!(
         text,
         "\n{} of {} combinations of the unknowns are seen; {}, {}",

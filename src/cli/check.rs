@@ -13,6 +13,7 @@ use super::output::{Failure, Outcome, check_outputs, open_machine, table};
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Machine file
+    #[arg(value_name = "MACHINE.ron")]
     machine: PathBuf,
     /// Random poses per kind of measurement and size of deviation
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]

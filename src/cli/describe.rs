@@ -16,7 +16,8 @@ use super::output::{
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Machine file
+    /// Machine file, calibrated or not
+    #[arg(value_name = "MACHINE.ron")]
     machine: PathBuf,
     /// List every combination that a measurement does not see
     #[arg(long)]

@@ -14,8 +14,10 @@ use super::output::{
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Machine file, calibrated or not
+    #[arg(value_name = "CALIBRATED.ron")]
     machine: PathBuf,
     /// Recording
+    #[arg(value_name = "REC.csv")]
     recording: PathBuf,
     /// Where to write the recording with model and residual columns
     #[arg(short, long, value_name = "OUT.csv")]

@@ -412,6 +412,12 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
             still(machine, problem)
         ));
     }
+    if fit.combinations.iter().all(|c| c.share < 1e-6) {
+        warnings.push(
+            "no constant deviation of the machine shows in these recordings; only what belongs to the set-up was found"
+                .into(),
+        );
+    }
     for open in &fit.open {
         warnings.push(format!("not seen by the recordings, left as declared: {open}"));
     }
