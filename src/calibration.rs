@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 use crate::chain::Chain;
 use crate::document::Document;
 use crate::error::Result;
-use crate::identify::Rms;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine, MachineFault, MachineForm, Placement, at_path, in_unit, to_text};
+
+use crate::rms::Rms;
 
 type Triple = (f64, f64, f64);
 

@@ -58,7 +58,7 @@ pub fn check(machine: &Machine, poses: usize, seed: u64) -> Vec<Check> {
                     continue;
                 }
                 checks.push(Check {
-                    measurement: name(&sensor).into(),
+                    measurement: sensor.name().into(),
                     by: by.into(),
                     deviations: label.into(),
                     poses,
@@ -68,16 +68,6 @@ pub fn check(machine: &Machine, poses: usize, seed: u64) -> Vec<Check> {
         }
     }
     checks
-}
-
-fn name(sensor: &Sensor) -> &'static str {
-    match sensor {
-        Sensor::Distance { .. } => "distance",
-        Sensor::Position => "position",
-        Sensor::Pose => "pose",
-        Sensor::Displacement { .. } => "displacement",
-        Sensor::Joint { .. } => "joint",
-    }
 }
 
 fn sensors(machine: &Machine) -> Vec<Sensor> {

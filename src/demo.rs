@@ -21,8 +21,8 @@ const NOISE: f64 = 5e-7;
 pub struct Demo {
     /// The machine with the errors that were put in.
     pub truth: CalibratedMachine,
-    /// Cone frustum (BK4), as a recording file would have it.
-    pub recording: String,
+    /// Cone frusta (BK4), inclined by 10° and 30°, as recording files would have them.
+    pub recordings: Vec<String>,
     /// The calibrated machine.
     pub calibrated: CalibratedMachine,
     /// What the identification says.
@@ -38,15 +38,22 @@ pub fn demo(seed: u64) -> Result<Demo> {
     let mut deviations = random_deviations(&machine, 1.0, seed);
     deviations[machine.w_index()] = Twist::zero(0.0);
     let truth = CalibratedMachine::nominal(machine.clone()).with_deviations(deviations);
-    let path = cone(&machine, BAR, 900).ok_or_else(|| Error::Undetermined {
-        what: "the reference machine does not reach the cone".into(),
-        mend: String::new(),
-    })?;
     let mut instrument = Instrument::new(Sensor::Distance { absolute: false }, NOISE, 0.0);
     instrument.state.length = BAR;
     let header = [format!("nominal_length[m]: {BAR}")];
-    let text = recording(&truth, &instrument, &path, &header, seed.wrapping_add(1));
-    let recordings = [Recording::from_bytes("demo_bk4.csv", text.clone().into_bytes(), &machine)?];
+    let (mut texts, mut recordings) = (Vec::new(), Vec::new());
+    for degrees in [10u8, 30] {
+        let path =
+            cone(&machine, BAR, f64::from(degrees).to_radians(), 900).ok_or_else(|| Error::Undetermined {
+                what: format!("the reference machine does not reach the cone inclined by {degrees}°"),
+                mend: String::new(),
+            })?;
+        let noise_seed = seed.wrapping_add(u64::from(degrees));
+        let text = recording(&truth, &instrument, &path, &header, noise_seed);
+        let name = format!("bk4_{degrees}deg.csv");
+        recordings.push(Recording::from_bytes(&name, text.clone().into_bytes(), &machine)?);
+        texts.push(text);
+    }
     let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
-    Ok(Demo { truth, recording: text, calibrated, fit })
+    Ok(Demo { truth, recordings: texts, calibrated, fit })
 }

@@ -114,11 +114,6 @@ impl Document {
             }
         }
     }
-
-    /// The file as the user named it.
-    pub fn file(&self) -> &Path {
-        &self.file
-    }
 }
 
 /// The mend where the text is not even near to what it should be.

@@ -13,26 +13,27 @@ mod source;
 mod thin;
 mod unknowns;
 
-pub use fit::{
-    BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, Rms, SetupFit, Suspect,
-};
+pub use fit::{BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, SetupFit, Suspect};
 pub use information::Information;
 pub use loss::Loss;
 pub(crate) use normal::Evaluator;
 pub use solve::{Solver, Stop};
 pub(crate) use source::channel;
 
+use serde::Serialize;
+
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
 use crate::lie::Twist;
 use crate::machine::Machine;
 use crate::recording::Recording;
+pub use crate::rms::Rms;
 use crate::units::Quantity;
 use information::Information as Info;
-use normal::{Noise, Normal, Tally};
+use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
 use source::Sources;
-use unknowns::{Layout, Unknowns};
+use unknowns::{Layout, Role, Unknowns};
 
 /// How to identify.
 #[derive(Clone, Copy, Debug)]
@@ -99,19 +100,20 @@ pub fn calibrate_with_progress(
         layout: &layout,
         loss: Loss::default(),
         prior: true,
-        free: layout.of_machine().iter().map(|m| !m).collect(),
+        progress,
+        // As declared: only what nobody has stated is fitted.
+        free: layout.mask(|block| !block.prior),
     };
     progress("finding the set-ups");
     let start = Unknowns::nominal(machine, &sources);
     let (placed, noise) = place(&problem, start)?;
     let nominal = placed.normal.tallies.clone();
 
-    progress("identifying the machine");
     problem.loss = options.loss;
     problem.prior = prior;
     problem.free = vec![true; layout.len];
     let found = settle(&problem, options.solver, placed.unknowns, noise)?;
-    let information = Info::new(&found.solution.normal.matrix, &layout, prior);
+    let information = Info::new(&found.solution.normal.matrix, &layout, prior, sources.samples());
     let calibrated = calibrated(machine, &sources, &found);
     let fit = fit::report(&problem, &nominal, &found, information, options)?;
     Ok((calibrated, fit))
@@ -137,7 +139,8 @@ pub fn fit_setup(
         layout: &layout,
         loss,
         prior: true,
-        free: layout.of_machine().iter().map(|m| !m).collect(),
+        progress: &|_| {},
+        free: layout.mask(|block| !matches!(block.role, Role::Dyad(_))),
     };
     let mut start = Unknowns::nominal(machine, &sources);
     start.dh = calibrated.deviations().to_vec();
@@ -189,6 +192,52 @@ fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &
     }
 }
 
+/// What recordings can tell, before anything is identified.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reach {
+    /// Independent combinations of all unknowns that these recordings see.
+    pub rank: usize,
+    /// Combinations that the same instruments would see on general poses.
+    pub rank_in_general: usize,
+    /// Unknowns in all: six per dyad and set-up, and what the recordings declare unknown.
+    pub unknowns: usize,
+    /// Samples used.
+    pub samples: u64,
+    /// Rows left out because a number was missing.
+    pub dropped: u64,
+    /// RMS of the residuals with the machine as declared.
+    pub nominal: Rms,
+}
+
+/// How many combinations of the unknowns these recordings see, at the machine as declared.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
+    let sources = Sources::new(recordings, machine, &|_| {})?;
+    enough_to_start(machine, &sources)?;
+    let layout = Layout::new(machine, &sources);
+    let problem = Problem {
+        machine,
+        sources: &sources,
+        layout: &layout,
+        loss: Loss::default(),
+        prior: true,
+        progress: &|_| {},
+        free: layout.mask(|block| !block.prior),
+    };
+    let (placed, _) = place(&problem, Unknowns::nominal(machine, &sources))?;
+    let general = normal::matrix_in_general(machine, &sources, &layout, &placed.unknowns);
+    Ok(Reach {
+        rank: Info::new(&placed.normal.matrix, &layout, true, sources.samples()).rank,
+        rank_in_general: Info::new(&general, &layout, true, 0).rank,
+        unknowns: layout.len,
+        samples: sources.samples(),
+        dropped: sources.all.iter().map(|s| s.summary.dropped).sum(),
+        nominal: normal::rms_over(&placed.normal.tallies),
+    })
+}
+
 /// A solution and the noise that it was weighted with.
 pub(crate) struct Found {
     pub solution: Solution,
@@ -200,7 +249,7 @@ pub(crate) struct Found {
 impl Found {
     /// Root mean square of residual lengths and angles over all samples, m and rad.
     pub fn rms(&self) -> Rms {
-        Rms::over(&self.solution.normal.tallies)
+        normal::rms_over(&self.solution.normal.tallies)
     }
 }
 
@@ -211,7 +260,8 @@ fn place(problem: &Problem, mut start: Unknowns) -> Result<(Solution, Vec<Noise>
     align::align(machine, sources, &thin, &mut start);
     let mut noise = thin::robust_noise(machine, sources, &thin, &start);
     let mut solution = problem.solve(Solver::LevenbergMarquardt, start, &noise)?;
-    for _ in 0..3 {
+    let rounds = if problem.free.contains(&true) { 3 } else { 0 };
+    for _ in 0..rounds {
         noise = thin::robust_noise(machine, sources, &thin, &solution.unknowns);
         solution = problem.solve(Solver::LevenbergMarquardt, solution.unknowns, &noise)?;
     }
@@ -228,7 +278,7 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
         seen = noise_left(problem, &solution.normal, &noise);
         let next = with_stated(problem.sources, &seen);
         let changed = noise.iter().zip(&next).any(|(a, b)| {
-            let differs = |x: f64, y: f64| (x - y).abs() > 1e-3 * y;
+            let differs = |x: f64, y: f64| (x - y).abs() > 3e-3 * y;
             differs(a.length, b.length) || differs(a.angle, b.angle)
         });
         if !changed {
@@ -249,12 +299,12 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
     let sources = &problem.sources.all;
     let free = problem.layout.mask(|_| true);
     let used = if problem.free == free {
-        Info::new(&normal.matrix, problem.layout, problem.prior).used
+        Info::new(&normal.matrix, problem.layout, problem.prior, problem.sources.samples()).used
     } else {
         problem.free.iter().filter(|f| **f).count() as f64
     };
     let kinds: Vec<_> = sources.iter().map(source::Source::noise_group).collect();
-    let rows: f64 = normal.tallies.iter().map(|t| t.length_weight + t.angle_weight).sum();
+    let rows = normal.tallies.iter().map(|t| t.length.inliers + t.angle.inliers).sum::<u64>() as f64;
     // Every scalar row bears its part of the parameters that are used up.
     let left = (1.0 - used / rows).max(0.05);
     kinds
@@ -264,13 +314,11 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
             let mut sum = Tally::default();
             let own = kinds.iter().zip(&normal.tallies).filter(|(k, _)| *k == kind);
             own.for_each(|(_, tally)| sum.add(tally));
-            let scale = |sum2: f64, rows: f64, present: f64| {
-                if rows > 0.0 { (sum2 / (rows * left)).sqrt().max(1e-12) } else { present }
+            let scale = |sums: &Sums, present: f64| match sums.inliers {
+                0 => present,
+                n => (sums.inlier_squares / (n as f64 * left)).sqrt().max(thin::FINEST),
             };
-            Noise {
-                length: scale(sum.weighted_length2, sum.length_weight, present.length),
-                angle: scale(sum.weighted_angle2, sum.angle_weight, present.angle),
-            }
+            Noise { length: scale(&sum.length, present.length), angle: scale(&sum.angle, present.angle) }
         })
         .collect()
 }

@@ -57,9 +57,9 @@
 //! let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
 //! let rms = fit.rms_m.expect("lengths were measured");
 //! assert!(rms.geometric < 0.1 * rms.nominal);
-//! // It is a pitch of 0.1 mrad.
-//! let pitch = calibrated.deviations().iter().map(|dh| dh.w.0[1]).sum::<f64>();
-//! assert!((pitch - 1e-4).abs() < 3e-5);
+//! // The carriage moves along a line that is pitched by 0.1 mrad against the workpiece.
+//! let about_y = |frame: &str| calibrated.deviations()[machine.frame_index(frame).expect("a frame")].w.0[1];
+//! assert!((about_y("x") - about_y("w") - 1e-4).abs() < 2e-6);
 //! # Ok::<(), kincal::Error>(())
 //! ```
 #![forbid(unsafe_code)]
@@ -77,6 +77,7 @@ pub mod lie;
 pub mod machine;
 pub mod predict;
 pub mod recording;
+mod rms;
 mod scalar;
 pub mod sensor;
 pub mod simulate;

@@ -72,56 +72,37 @@ impl Scalar for f64 {
     }
 }
 
-impl Scalar for Dual64 {
-    #[inline(always)]
-    fn lift(self, value: f64) -> Self {
-        Dual64::from(value)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        DualNum::sqrt(&self)
-    }
-    #[inline(always)]
-    fn recip(self) -> Self {
-        DualNum::recip(&self)
-    }
-    #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        DualNum::sin_cos(&self)
-    }
-    #[inline(always)]
-    fn atan2(self, x: Self) -> Self {
-        DualNum::atan2(&self, x)
-    }
-    #[inline(always)]
-    fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self {
-        if self.re < limit { below } else { otherwise }
-    }
+/// The operations of a dual number, which num-dual has under the same names.
+macro_rules! dual_scalar {
+    ($dual:ty $(, const $n:ident)?) => {
+        impl$(<const $n: usize>)? Scalar for $dual {
+            #[inline(always)]
+            fn lift(self, value: f64) -> Self {
+                <$dual>::from(value)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                DualNum::sqrt(&self)
+            }
+            #[inline(always)]
+            fn recip(self) -> Self {
+                DualNum::recip(&self)
+            }
+            #[inline(always)]
+            fn sin_cos(self) -> (Self, Self) {
+                DualNum::sin_cos(&self)
+            }
+            #[inline(always)]
+            fn atan2(self, x: Self) -> Self {
+                DualNum::atan2(&self, x)
+            }
+            #[inline(always)]
+            fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self {
+                if self.re < limit { below } else { otherwise }
+            }
+        }
+    };
 }
 
-impl<const N: usize> Scalar for DualSVec64<N> {
-    #[inline(always)]
-    fn lift(self, value: f64) -> Self {
-        DualSVec64::from(value)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        DualNum::sqrt(&self)
-    }
-    #[inline(always)]
-    fn recip(self) -> Self {
-        DualNum::recip(&self)
-    }
-    #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
-        DualNum::sin_cos(&self)
-    }
-    #[inline(always)]
-    fn atan2(self, x: Self) -> Self {
-        DualNum::atan2(&self, x)
-    }
-    #[inline(always)]
-    fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self {
-        if self.re < limit { below } else { otherwise }
-    }
-}
+dual_scalar!(Dual64);
+dual_scalar!(DualSVec64<N>, const N);

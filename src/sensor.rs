@@ -60,6 +60,17 @@ pub struct Reading<S> {
 }
 
 impl Sensor {
+    /// The kind as recordings spell it.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Sensor::Distance { .. } => "distance",
+            Sensor::Position => "position",
+            Sensor::Pose => "pose",
+            Sensor::Displacement { .. } => "displacement",
+            Sensor::Joint { .. } => "joint",
+        }
+    }
+
     /// How many scalar readings a sample has.
     pub fn reading_count(&self) -> usize {
         match self {

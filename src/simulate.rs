@@ -185,15 +185,21 @@ pub fn inverse(
     None
 }
 
-/// A cone in the workpiece, ISO 10791-6 BK4 with a bar of `length` from the workpiece origin to the tool point: half apex angle
-/// 45°, inclined by 30°. The tool's axis stands square to the bar. `count` poses in each sense of travel.
-pub fn cone(machine: &Machine, length: f64, count: usize) -> Option<Vec<Vec<f64>>> {
+/// A cone in the workpiece, ISO 10791-6 BK4 with a bar of `length` (m) from the workpiece origin to the tool point: half apex angle
+/// 45°, axis inclined by `inclination` (rad); the tool's axis runs on the opposite side of the same cone, 60° ahead. `count` poses
+/// in each sense of travel; `None` where the machine does not reach them.
+pub fn cone(machine: &Machine, length: f64, inclination: f64, count: usize) -> Option<Vec<Vec<f64>>> {
     let chain = Chain::nominal(machine);
     let half = 0.5f64;
-    let (e, n) = (Vec3([0.0, -half, 0.75f64.sqrt()]), Vec3([0.0, 0.75f64.sqrt(), half]));
+    let (sin, cos) = inclination.sin_cos();
+    let (e, n) = (Vec3([0.0, -sin, cos]), Vec3([0.0, cos, sin]));
+    // Where bar and tool turn in step, the bar stands still as the tool sees it and a good part of the errors with it: the tool
+    // leads by 60°.
+    let lead = std::f64::consts::FRAC_PI_3;
+    let generator = |phi: f64| n.times(phi.cos()) + Vec3([phi.sin(), 0.0, 0.0]);
     let target = |phi: f64| {
-        let m = n.times(phi.cos()) + Vec3([phi.sin(), 0.0, 0.0]);
-        ((e + m).times(length * half.sqrt()), (e - m).times(half.sqrt()))
+        let (bar, tool) = (e + generator(phi), e - generator(phi + lead));
+        (bar.times(length * half.sqrt()), tool.times(half.sqrt()))
     };
     let (p_w, axis_w) = target(0.0);
     let inside = |q: &[f64]| {

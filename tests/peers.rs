@@ -84,19 +84,22 @@ fn w_from_t(workpiece: Vec<Dyad>, tool: Vec<Dyad>, row: &Row, columns: &[(&str, 
     Chain::nominal(&machine).w_from_t(&q)
 }
 
-fn assert_at(row: &Row, p: Vec3<f64>, file: &str, line: usize) {
+/// How far off, mm.
+fn assert_at(row: &Row, p: Vec3<f64>, file: &str, line: usize) -> f64 {
     let world = Vec3([row.get("world_x_mm"), row.get("world_y_mm"), row.get("world_z_mm")]);
     let off = (p - world).norm() * 1e3;
     assert!(off < 1e-9, "{file}, row {line}: off by {off} mm");
+    off
 }
 
-/// `R = Rz(c) Ry(b) Rx(a)` of the world columns.
-fn assert_turned(row: &Row, pose: Pose<f64>, file: &str, line: usize) {
+/// How far turned against `R = Rz(c) Ry(b) Rx(a)` of the world columns, deg.
+fn assert_turned(row: &Row, pose: Pose<f64>, file: &str, line: usize) -> f64 {
     let turn = |axis, column| Pose::turn(axis, row.get(column));
     let world = turn(Z, "world_c_deg") * turn(Y, "world_b_deg") * turn(X, "world_a_deg");
     let between = Pose { translation: ZERO, ..world }.inverse() * Pose { translation: ZERO, ..pose };
     let off = between.rotation_vector().norm().to_degrees();
     assert!(off < 1e-9, "{file}, row {line}: turned by {off} deg");
+    off
 }
 
 /// Runs over one table; `chain` makes the pose of a row, arms are compared in orientation too.
@@ -104,13 +107,16 @@ fn compare(file: &str, oriented: bool, chain: impl Fn(&Row) -> Pose<f64>) {
     let Some(folder) = peers("peers/linuxcnc") else { return };
     let rows = rows(&folder.join(file));
     assert!(rows.len() >= 300, "{file} has only {} rows", rows.len());
+    let (mut off_mm, mut off_deg) = (0.0f64, 0.0f64);
     for (i, row) in rows.iter().enumerate() {
         let pose = chain(row);
-        assert_at(row, pose.translation, file, i + 2);
+        off_mm = off_mm.max(assert_at(row, pose.translation, file, i + 2));
         if oriented {
-            assert_turned(row, pose, file, i + 2);
+            off_deg = off_deg.max(assert_turned(row, pose, file, i + 2));
         }
     }
+    let turned = if oriented { format!(", {off_deg:.1e} deg") } else { String::new() };
+    println!("{file:<16} {} rows: worst {off_mm:.1e} mm{turned}", rows.len());
 }
 
 fn rotary_point(row: &Row) -> Vec3<f64> {
@@ -304,6 +310,7 @@ fn golden_positions_of_the_paper_machine() {
     let (nominal, actual) = (Chain::nominal(&machine), Chain::new(&machine, &deviations));
     let rows = rows(&folder.join("golden_fk.csv"));
     assert!(!rows.is_empty());
+    let mut worst = 0.0f64;
     for row in &rows {
         let q = golden_commands(&machine, row);
         let golden = |name: &str| Vec3(["x", "y", "z"].map(|k| row.get(&format!("{name}_{k}_m"))));
@@ -315,7 +322,9 @@ fn golden_positions_of_the_paper_machine() {
         let linear: f64 =
             (increments.iter().flat_map(|d| d.to_array()).zip(by_increment)).map(|(d, r)| d * r).sum();
         assert!((linear - row.get("linear_Jd_phi6_m")).abs() < 1e-12, "{linear}");
+        worst = worst.max((p - golden("pw")).norm()).max((p_6 - golden("pw6")).norm());
     }
+    println!("golden positions {} rows: worst {worst:.1e} m", rows.len());
 }
 
 #[test]
@@ -325,6 +334,7 @@ fn golden_distance_rows_of_the_paper_machine() {
     let positions = rows(&folder.join("golden_fk.csv"));
     let golden = rows(&folder.join("golden_jacobian.csv"));
     assert_eq!(golden.len(), 4);
+    let mut worst = 0.0f64;
     for row in golden {
         let phi = row.get("phi_deg");
         let at = positions.iter().find(|p| (p.get("phi_deg") - phi).abs() < 1e-9).expect("the same phi");
@@ -333,7 +343,9 @@ fn golden_distance_rows_of_the_paper_machine() {
             for (k, theirs) in row.twist(&dyad.frame).into_iter().enumerate() {
                 let difference = (ours[6 * j + k] - theirs).abs();
                 assert!(difference < 1e-12, "frame {}, component {k}: {difference}", dyad.frame);
+                worst = worst.max(difference);
             }
         }
     }
+    println!("golden Jacobian rows: worst {worst:.1e} (m per m, m per rad)");
 }

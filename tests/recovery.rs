@@ -206,3 +206,34 @@ fn the_named_solvers_do_what_their_names_say() {
     let error = run(Solver::GaussNewton).expect_err("28 of 42 directions are not seen");
     assert!(error.to_string().contains("singular"), "{error}");
 }
+
+#[test]
+fn noise_of_clean_data_is_found_the_same_under_every_loss() {
+    let machine = tightened(&common::machine("six_r_arm"));
+    let truth =
+        CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(&machine, 1.0, 5));
+    let losses = [
+        Loss::Huber { k: 3.0 },
+        Loss::Huber { k: 2.0 },
+        Loss::Huber { k: 1.345 },
+        Loss::Tukey { c: 6.0 },
+        Loss::Tukey { c: 4.685 },
+    ];
+    for sensor in [Sensor::Distance { absolute: false }, Sensor::Position, Sensor::Pose] {
+        let (instrument, header) = instrument(&machine, sensor.clone());
+        let csv = recording(&truth, &instrument, &random_commands(&machine, 2000, 6), &header, 7);
+        let recordings =
+            [Recording::from_bytes("clean.csv", csv.into_bytes(), &machine)
+                .unwrap_or_else(|e| panic!("{e}"))];
+        let sigma = |loss: Loss| {
+            let options = Options { loss, ..Options::default() };
+            calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}")).1.recordings[0].sigma
+        };
+        let squares = sigma(Loss::Squares);
+        for loss in losses {
+            let ratio = sigma(loss) / squares;
+            println!("{sensor:?} {loss:?}: {ratio:.4} of the noise that least squares finds");
+            assert!((ratio - 1.0).abs() < 0.02, "{sensor:?} {loss:?}: {ratio:.4}");
+        }
+    }
+}

@@ -20,10 +20,11 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Outcome {
     check_outputs(&[args.common.json_file()], &[])?;
     let demo = demo(args.seed)?;
-    let rows = demo.recording.lines().filter(|l| !l.starts_with('#')).count() - 1;
     let mut text = format!(
         "The AC table-tilting reference machine, with random errors of its declared tolerances in every frame, is measured by a \
-         simulated ballbar\non a cone in both senses of travel (ISO 10791-6 BK4, bar 100 mm, noise 0.5 um): {rows} distances.\n\n"
+         simulated ballbar\non two cones in both senses of travel (ISO 10791-6 BK4, inclined by 10 and 30 deg; bar 100 mm, noise \
+         0.5 um): {} distances.\n\n",
+        demo.fit.samples
     );
     text.push_str(&render(&demo.fit, false));
     if let Some(rms) = demo.fit.rms_m {

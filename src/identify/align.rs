@@ -17,6 +17,8 @@ use crate::sensor::Sensor;
 const DEGENERATE: f64 = 1e-6;
 /// Rounds of turning, moving and shifting the tool points; the exact fit that follows needs a rough start only.
 const ROUNDS: usize = 30;
+/// Rounds of concentrating on the samples that fit best.
+const ATTEMPTS: usize = 12;
 
 /// A sample as the alignment sees it.
 struct Sight {
@@ -65,12 +67,12 @@ fn sights(
     .collect()
 }
 
-/// Alignment of one set-up whose frame is unknown; gross outliers are left out of the second and third attempt.
+/// Alignment of one set-up whose frame is unknown.
 fn align_setup(sources: &Sources, setup: usize, sights: Vec<Sight>, unknowns: &mut Unknowns) {
     let nominal = unknowns.setups[setup].previous_from_w;
     let mut kept: Vec<&Sight> = sights.iter().collect();
     let mut m_from_w = nominal;
-    for _ in 0..3 {
+    for _ in 0..ATTEMPTS {
         start_tool_points(sources, &kept, unknowns);
         for _ in 0..ROUNDS {
             let next = best_frame(sources, &kept, nominal, unknowns);
@@ -82,16 +84,16 @@ fn align_setup(sources: &Sources, setup: usize, sights: Vec<Sight>, unknowns: &m
                 break;
             }
         }
-        let misses: Vec<f64> =
-            sights.iter().map(|s| miss(sources, s, m_from_w, unknowns).unwrap_or(0.0)).collect();
-        let mut sorted: Vec<f64> = misses.iter().copied().filter(|m| *m > 0.0).collect();
-        if sorted.is_empty() {
-            break;
-        }
-        sorted.sort_by(f64::total_cmp);
-        let limit = 6.0 * sorted[sorted.len() / 2] + 1e-9;
-        kept = sights.iter().zip(&misses).filter(|(_, m)| **m <= limit).map(|(s, _)| s).collect();
-        if kept.len() == sights.len() {
+        // Concentrate on the three quarters that fit best: gross outliers lose their pull, clean data lose nothing by it.
+        let mut misses: Vec<(f64, &Sight)> =
+            sights.iter().filter_map(|s| Some((miss(sources, s, m_from_w, unknowns)?, s))).collect();
+        misses.sort_by(|a, b| a.0.total_cmp(&b.0));
+        misses.truncate((3 * misses.len()).div_ceil(4));
+        let others = sights.iter().filter(|s| miss(sources, s, m_from_w, unknowns).is_none());
+        let next: Vec<&Sight> = misses.into_iter().map(|(_, s)| s).chain(others).collect();
+        let same = next.len() == kept.len() && next.iter().zip(&kept).all(|(a, b)| std::ptr::eq(*a, *b));
+        kept = next;
+        if same {
             break;
         }
     }
@@ -228,10 +230,9 @@ fn best_frame(
         }
     }
     let count = pairs.len().max(1) as f64;
-    let mean = |pick: &dyn Fn(&(Vec3<f64>, Vec3<f64>)) -> Vec3<f64>| {
-        pairs.iter().fold(Vec3([0.0; 3]), |sum, p| sum + pick(p)).times(1.0 / count)
-    };
-    let (mean_w, mean_m) = (mean(&|p| p.0), mean(&|p| p.1));
+    let (sum_w, sum_m) =
+        pairs.iter().fold((Vec3([0.0; 3]), Vec3([0.0; 3])), |(w, m), (p_w, p_m)| (w + *p_w, m + *p_m));
+    let (mean_w, mean_m) = (sum_w.times(1.0 / count), sum_m.times(1.0 / count));
     let mut covariance = Matrix3::zeros();
     for (p_w, p_m) in &pairs {
         covariance += Vector3::from(*p_m - mean_m) * Vector3::from(*p_w - mean_w).transpose();

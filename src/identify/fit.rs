@@ -3,42 +3,21 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::normal::{Tally, matrix_in_general, sigmas, standardised};
+use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
 use super::solve::Problem;
 use super::unknowns::{Block, Role};
 use super::{Evaluator, Found, Information, Loss, Options, Solver, Stop};
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::sensor::Sensor;
+use crate::rms::Rms;
 use crate::units::Quantity;
 
 /// Names of a twist's components in the order (v; w).
 pub const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
+/// Deviations beyond so many tolerances are told.
+const CONTRADICTED: f64 = 5.0;
 /// Down-weighted samples that are listed one by one; all are counted.
 const LISTED: usize = 50;
-
-/// Root mean square of the residuals' Euclidean norm over samples; `None` where nothing of the kind was measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Rms {
-    /// Of lengths, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub m: Option<f64>,
-    /// Of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rad: Option<f64>,
-}
-
-impl Rms {
-    pub(crate) fn over(tallies: &[Tally]) -> Self {
-        let mean = |pick: fn(&Tally) -> (f64, f64)| {
-            let own: Vec<&Tally> = tallies.iter().filter(|t| pick(t).1 > 0.0).collect();
-            let samples: u64 = own.iter().map(|t| t.samples).sum();
-            let sum: f64 = own.iter().map(|t| pick(t).0).sum();
-            (samples > 0).then(|| (sum / samples as f64).sqrt())
-        };
-        Rms { m: mean(|t| (t.length2, t.length_weight)), rad: mean(|t| (t.angle2, t.angle_weight)) }
-    }
-}
 
 /// Everything that an identification has to say. Numbers in SI.
 #[derive(Clone, Debug, Serialize)]
@@ -185,17 +164,6 @@ pub struct Suspect {
     pub weight: f64,
 }
 
-/// Name of a measurement as recordings spell it.
-pub(crate) fn measurement_name(sensor: &Sensor) -> &'static str {
-    match sensor {
-        Sensor::Distance { .. } => "distance",
-        Sensor::Position => "position",
-        Sensor::Pose => "pose",
-        Sensor::Displacement { .. } => "displacement",
-        Sensor::Joint { .. } => "joint",
-    }
-}
-
 pub(super) fn report(
     problem: &Problem,
     nominal: &[Tally],
@@ -205,7 +173,7 @@ pub(super) fn report(
 ) -> Result<Fit> {
     let (machine, sources, layout) = (problem.machine, problem.sources, problem.layout);
     let tallies = &found.solution.normal.tallies;
-    let (before, after) = (Rms::over(nominal), Rms::over(tallies));
+    let (before, after) = (rms_over(nominal), rms_over(tallies));
     let pair =
         |before: Option<f64>, after: Option<f64>| Some(BeforeAfter { nominal: before?, geometric: after? });
     let recordings = (sources.all.iter().enumerate())
@@ -215,11 +183,11 @@ pub(super) fn report(
             RecordingFit {
                 name: source.recording.name().to_string(),
                 setup: sources.setups[source.setup].clone(),
-                measurement: measurement_name(&source.sensor).into(),
+                measurement: source.sensor.name().into(),
                 samples: source.summary.samples,
                 dropped: source.summary.dropped,
-                nominal: Rms::over(&nominal[i..=i]),
-                geometric: Rms::over(&tallies[i..=i]),
+                nominal: rms_over(&nominal[i..=i]),
+                geometric: rms_over(&tallies[i..=i]),
                 sigma: pick(&found.noise[i]),
                 birge: source.recording.header().sigma.map(|s| pick(&found.seen[i]) / s.value),
             }
@@ -227,7 +195,7 @@ pub(super) fn report(
         .collect();
     let readings = sources.readings();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
-    let rank_in_general = Information::new(&general, layout, problem.prior).rank;
+    let rank_in_general = Information::new(&general, layout, problem.prior, 0).rank;
     let suspects = suspects(problem, found)?;
     let fit = Fit {
         machine: machine.name().into(),
@@ -340,6 +308,15 @@ fn in_words(problem: &Problem, vector: &DVector<f64>) -> String {
     let mut parts: Vec<(f64, &str)> =
         vector.iter().zip(&labels).filter(|(x, _)| x.abs() > 0.1).map(|(x, l)| (*x, l.as_str())).collect();
     parts.sort_by(|a, b| b.0.abs().total_cmp(&a.0.abs()));
+    if let [(_, label)] = parts[..]
+        && let Some((owner, component)) = label.rsplit_once('.')
+    {
+        let axis = &component[component.len() - 1..];
+        return match component.as_bytes()[0] {
+            b'w' => format!("the turn of {owner} about its {axis} axis"),
+            _ => format!("the place of {owner} along its {axis} axis"),
+        };
+    }
     let named: Vec<String> = parts.iter().take(4).map(|(x, l)| format!("{x:+.2} {l}")).collect();
     named.join(" ")
 }
@@ -396,6 +373,11 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
             warnings.push(format!("{}: {warning}", source.recording.name()));
         }
     }
+    if clocks_overlap(problem) {
+        warnings.push(
+            "recordings overlap in time: `t` must run on one clock for all of them before drift or slips can be told".into(),
+        );
+    }
     // (22)
     let needed = fit.rank.max(1) as u64;
     if fit.readings < 5 * needed {
@@ -420,6 +402,21 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     }
     for open in &fit.open {
         warnings.push(format!("not seen by the recordings, left as declared: {open}"));
+    }
+    // A tolerance that the data contradict pulls at everything else.
+    let contradicted = fit.parameters.iter().filter(|p| p.value.abs() > CONTRADICTED * p.tolerance);
+    let mut frames: Vec<(&str, f64)> = Vec::new();
+    for p in contradicted {
+        let size = p.value.abs() / p.tolerance;
+        match frames.iter_mut().find(|(frame, _)| *frame == p.frame) {
+            Some((_, largest)) => *largest = largest.max(size),
+            None => frames.push((&p.frame, size)),
+        }
+    }
+    for (frame, size) in frames {
+        warnings.push(format!(
+            "frame {frame} lies {size:.0} tolerances from where the machine file has it: check its declaration, or state a larger tolerance there"
+        ));
     }
     // Recordings of one kind share their noise, and often the figure: one sentence for all of them.
     let mut above: Vec<(String, Vec<&str>)> = Vec::new();
@@ -447,6 +444,13 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
         warnings.push("the number of steps was used up before the fit settled".into());
     }
     warnings
+}
+
+/// Whether two recordings claim the same time.
+fn clocks_overlap(problem: &Problem) -> bool {
+    let mut spans: Vec<(f64, f64)> = problem.sources.all.iter().filter_map(|s| s.summary.time).collect();
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    spans.windows(2).any(|pair| pair[1].0 < pair[0].1)
 }
 
 /// Which joints stand still, as the end of a sentence.

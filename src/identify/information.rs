@@ -2,10 +2,13 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::unknowns::Layout;
+use super::unknowns::{Layout, Role};
 
 /// Eigenvalues of the scaled information below this part of the largest are rounding: not seen.
 pub(crate) const SEEN: f64 = 1e-12;
+/// An unknown without prior whose information is below this, in units of its tolerance, is open: its standard error exceeds thirty
+/// tolerances. Two socket points, say, see the turn about their line only through the noise of the points.
+const OPEN: f64 = 1e-3;
 
 /// The information of the data in coordinates scaled by the tolerances, and what follows from it together with the prior.
 #[derive(Clone, Debug)]
@@ -33,8 +36,8 @@ impl Information {
         self.strength[i] / (1.0 + self.strength[i])
     }
 
-    /// From the data's matrix in m and rad; `prior` says whether the blocks' priors count.
-    pub(crate) fn new(matrix: &DMatrix<f64>, layout: &Layout, prior: bool) -> Self {
+    /// From the data's matrix in m and rad over so many samples; `prior` says whether the blocks' priors count.
+    pub(crate) fn new(matrix: &DMatrix<f64>, layout: &Layout, prior: bool, samples: u64) -> Self {
         let scales = layout.scales();
         let scaled = DMatrix::from_fn(layout.len, layout.len, |a, b| matrix[(a, b)] * scales[a] * scales[b]);
         let has_prior = layout.mask(|b| b.prior);
@@ -62,18 +65,21 @@ impl Information {
         );
         let directions = DMatrix::from_fn(order.len(), order.len(), |a, i| eigen.eigenvectors[(a, order[i])]);
 
-        // (28): posterior covariance; where no prior counts, only the seen part of the space has one.
-        let mut full = scaled.clone();
+        // (28): posterior covariance, infinite along what neither data nor prior hold.
+        let open = open_directions(&outer, &rest, &least(layout, samples, largest));
+        let mut full = scaled;
         if prior {
             positions.iter().for_each(|i| full[(*i, *i)] += 1.0);
         }
         let eigen = SymmetricEigen::new(full);
         let mut variance = DVector::zeros(layout.len);
-        for (i, value) in eigen.eigenvalues.iter().enumerate() {
-            let vector = eigen.eigenvectors.column(i);
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let is_open = open.iter().map(|o| o.dot(&vector).powi(2)).sum::<f64>() > 0.5;
+            let unheld = is_open || !prior && *value <= floor;
             for (a, x) in vector.iter().enumerate() {
-                if *value > floor.max(1e-300) {
-                    variance[a] += x * x / value;
+                if !unheld {
+                    // The prior's own information is a floor that rounding must not undercut.
+                    variance[a] += x * x / if prior { value.max(1.0) } else { *value };
                 } else if x.abs() > 1e-4 {
                     variance[a] = f64::INFINITY;
                 }
@@ -82,7 +88,6 @@ impl Information {
         let used =
             strength.iter().map(|s| if prior { s / (1.0 + s) } else { f64::from(*s > 0.0) }).sum::<f64>()
                 + (rest.len() as f64);
-        let open = open_directions(&outer, &cross, &inner, &rest, layout.len, floor);
         let used = used - open.len() as f64;
         Information { rank, directions, strength, positions, variance, open, used }
     }
@@ -98,26 +103,33 @@ fn pseudo_inverse(matrix: &DMatrix<f64>, largest: f64) -> DMatrix<f64> {
     &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
 }
 
-/// Directions among the unknowns without prior that no data see, even with everything else held by its prior.
-fn open_directions(
-    outer: &DMatrix<f64>,
-    cross: &DMatrix<f64>,
-    inner: &DMatrix<f64>,
-    rest: &[usize],
-    len: usize,
-    floor: f64,
-) -> Vec<DVector<f64>> {
+/// The least information that counts for each unknown. About an axis that its points do not leave, a frame seems to be seen through
+/// the noise of the points themselves: as much as one square radian per two readings. Ten times that is asked for.
+fn least(layout: &Layout, samples: u64, largest: f64) -> DVector<f64> {
+    let mut least = DVector::from_element(layout.len, OPEN.max(2e-15 * largest));
+    for block in layout.blocks.iter().filter(|b| matches!(b.role, Role::Setup(_))) {
+        for k in 3..6 {
+            let through_noise = 20.0 * samples as f64 * block.scale[k].powi(2);
+            least[block.offset + k] = least[block.offset + k].max(through_noise);
+        }
+    }
+    least
+}
+
+/// Directions among the unknowns without prior that the data would not show even on a machine without any deviation: their
+/// information is below the `least` that counts.
+fn open_directions(outer: &DMatrix<f64>, rest: &[usize], least: &DVector<f64>) -> Vec<DVector<f64>> {
     if rest.is_empty() {
         return Vec::new();
     }
-    let held = inner + DMatrix::identity(inner.nrows(), inner.nrows());
-    let Some(cholesky) = nalgebra::Cholesky::new(held) else { return Vec::new() };
-    let eigen = SymmetricEigen::new(outer - cross * cholesky.solve(&cross.transpose()));
-    let open = eigen.eigenvalues.iter().enumerate().filter(|(_, v)| **v <= floor);
-    open.map(|(i, _)| {
-        let mut vector = DVector::zeros(len);
-        rest.iter().enumerate().for_each(|(a, at)| vector[*at] = eigen.eigenvectors[(a, i)]);
-        vector
-    })
-    .collect()
+    let eigen = SymmetricEigen::new(outer.clone());
+    let directions = eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter());
+    directions
+        .filter_map(|(direction, value)| {
+            let mut vector = DVector::zeros(least.len());
+            rest.iter().zip(direction.iter()).for_each(|(at, x)| vector[*at] = *x);
+            let limit: f64 = vector.iter().zip(least).map(|(x, least)| x * x * least).sum();
+            (*value <= limit).then_some(vector)
+        })
+        .collect()
 }

@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::lie::{Mat3, Pose, Twist, Vec3};
 use crate::machine::Machine;
 use crate::recording::Chunk;
+use crate::rms::Rms;
 use crate::sensor::{MOST_READINGS, Sensor, SensorState};
 use crate::units::Quantity;
 
@@ -29,19 +30,32 @@ impl Noise {
     }
 }
 
+/// Sums over residuals of one quantity.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sums {
+    /// Scalar rows, and the sum of their squares, m² or rad², unweighted.
+    pub rows: u64,
+    pub squares: f64,
+    /// The same over the samples that count.
+    pub inliers: u64,
+    pub inlier_squares: f64,
+}
+
+impl Sums {
+    fn add(&mut self, o: &Sums) {
+        self.rows += o.rows;
+        self.squares += o.squares;
+        self.inliers += o.inliers;
+        self.inlier_squares += o.inlier_squares;
+    }
+}
+
 /// Sums over one source's samples that people read.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tally {
     pub samples: u64,
-    /// Sum of squared lengths in the residuals, m², unweighted.
-    pub length2: f64,
-    /// Sum of squared angles, rad², unweighted.
-    pub angle2: f64,
-    /// Weighted sums of squares and the numbers of scalar rows they are over.
-    pub weighted_length2: f64,
-    pub weighted_angle2: f64,
-    pub length_weight: f64,
-    pub angle_weight: f64,
+    pub length: Sums,
+    pub angle: Sums,
     /// Samples whose weight is below one half.
     pub down_weighted: u64,
 }
@@ -49,14 +63,21 @@ pub(crate) struct Tally {
 impl Tally {
     pub fn add(&mut self, o: &Tally) {
         self.samples += o.samples;
-        self.length2 += o.length2;
-        self.angle2 += o.angle2;
-        self.weighted_length2 += o.weighted_length2;
-        self.weighted_angle2 += o.weighted_angle2;
-        self.length_weight += o.length_weight;
-        self.angle_weight += o.angle_weight;
+        self.length.add(&o.length);
+        self.angle.add(&o.angle);
         self.down_weighted += o.down_weighted;
     }
+}
+
+/// Root mean square over the samples of some sources.
+pub(crate) fn rms_over(tallies: &[Tally]) -> Rms {
+    let over = |pick: fn(&Tally) -> &Sums| {
+        let own: Vec<&Tally> = tallies.iter().filter(|t| pick(t).rows > 0).collect();
+        let samples: u64 = own.iter().map(|t| t.samples).sum();
+        let squares: f64 = own.iter().map(|t| pick(t).squares).sum();
+        (samples > 0).then(|| (squares / samples as f64).sqrt())
+    };
+    Rms { m: over(|t| &t.length), rad: over(|t| &t.angle) }
 }
 
 /// Gauss-Newton matrix, gradient and loss of all data at one state, in m and rad; no prior in it.
@@ -69,6 +90,8 @@ pub(crate) struct Normal {
     pub tallies: Vec<Tally>,
 }
 
+/// Samples with a smaller weight say nothing about the noise.
+const COUNTS: f64 = 0.25;
 /// Extra columns of a source behind the six of each dyad: tool point, zero, length.
 const EXTRAS: usize = 5;
 
@@ -250,14 +273,14 @@ fn part(
             whitened[k * count + i] = residual * factor;
             slot[i * width..(i + 1) * width].iter_mut().for_each(|x| *x *= factor);
             let angle = count == 6 && i >= 3 || count == 1 && source_is_angle(source, evaluator.machine);
-            let (sum, weighted, weights) = if angle {
-                (&mut tally.angle2, &mut tally.weighted_angle2, &mut tally.angle_weight)
-            } else {
-                (&mut tally.length2, &mut tally.weighted_length2, &mut tally.length_weight)
-            };
-            *sum += residual * residual;
-            *weighted += weight * residual * residual;
-            *weights += weight;
+            let sums = if angle { &mut tally.angle } else { &mut tally.length };
+            sums.rows += 1;
+            sums.squares += residual * residual;
+            // The noise is that of the samples that the model claims to describe.
+            if weight > COUNTS {
+                sums.inliers += 1;
+                sums.inlier_squares += residual * residual;
+            }
         }
     }
     let matrix = &rows * rows.transpose();

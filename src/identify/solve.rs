@@ -72,6 +72,8 @@ pub(crate) struct Problem<'a> {
     pub prior: bool,
     /// Which parameters may move.
     pub free: Vec<bool>,
+    /// Told what the solver is at, before every pass over the data.
+    pub progress: &'a dyn Fn(&str),
 }
 
 /// Where a solver ended.
@@ -189,6 +191,7 @@ impl Problem<'_> {
                     break 'outer Stop::Steps;
                 }
                 steps += 1;
+                (self.progress)(&format!("step {steps}, objective {objective:.6e}"));
                 let step = self.full(&(&eigen.eigenvectors * &amounts), &scales);
                 let next = unknowns.stepped(self.layout, &step);
                 let next_normal = self.normal(&next, noise)?;
@@ -227,6 +230,7 @@ impl Problem<'_> {
         let mut unknowns = start;
         let mut normal = self.normal(&unknowns, noise)?;
         for steps in 0..most {
+            (self.progress)(&format!("step {}", steps + 1));
             let (matrix, gradient) = self.scaled(&normal, &unknowns, &scales);
             let step = one_step(solver, matrix, &gradient)?;
             unknowns = unknowns.stepped(self.layout, &self.full(&step, &scales));

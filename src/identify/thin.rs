@@ -7,6 +7,8 @@ use crate::error::Result;
 use crate::machine::Machine;
 use crate::units::Quantity;
 
+/// No instrument resolves less, m or rad; without it, exact simulated data would have no noise at all.
+pub(crate) const FINEST: f64 = 1e-9;
 /// As many samples of one recording at most.
 const MOST: u64 = 2000;
 
@@ -83,5 +85,5 @@ fn median_scale(mut sizes: Vec<f64>) -> f64 {
         return 1.0;
     }
     sizes.sort_by(f64::total_cmp);
-    (1.4826 * sizes[sizes.len() / 2]).max(1e-12)
+    (1.4826 * sizes[sizes.len() / 2]).max(FINEST)
 }

@@ -94,11 +94,6 @@ impl Layout {
         DVector::from_iterator(self.len, scales)
     }
 
-    /// Which parameters belong to the machine, in order: everything but what a set-up brings along.
-    pub fn of_machine(&self) -> Vec<bool> {
-        self.mask(|b| matches!(b.role, Role::Dyad(_)))
-    }
-
     /// Which parameters fulfil a condition on their block, in order.
     pub fn mask(&self, holds: impl Fn(&Block) -> bool) -> Vec<bool> {
         self.blocks.iter().flat_map(|b| std::iter::repeat_n(holds(b), b.len)).collect()

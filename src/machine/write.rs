@@ -46,7 +46,25 @@ pub(crate) fn to_text(form: &MachineForm) -> String {
     let options = ron::Options::default().with_default_extension(EXTENSIONS);
     let text =
         options.to_string_pretty(form, config).expect("a machine form has nothing that RON cannot write");
-    format!("Machine{text}\n")
+    format!("Machine{}\n", one_entry_a_line(&text))
+}
+
+/// Lists below the second level (those of a calibration) come out on one line; here each entry gets its own.
+fn one_entry_a_line(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 256);
+    for line in text.split_inclusive('\n') {
+        let list = line.starts_with("        ").then(|| line.split_once(": [(")).flatten();
+        match list.and_then(|(field, rest)| Some((field, rest.trim_end().strip_suffix(")],")?))) {
+            Some((field, entries))
+                if field.trim_start().chars().all(|c| c.is_ascii_lowercase() || c == '_') =>
+            {
+                let entries = entries.replace("), (", "),\n            (");
+                out.push_str(&format!("{field}: [\n            ({entries}),\n        ],\n"));
+            }
+            _ => out.push_str(line),
+        }
+    }
+    out
 }
 
 fn length_word(unit: Unit) -> LengthUnit {

@@ -328,7 +328,9 @@ fn values(
     };
     let lack = |names: &[String], example: &str| {
         let names: Vec<&String> = names.iter().collect();
-        let missing = names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(" ");
+        let missing = names.iter().map(|n| format!("`{n}`")).collect::<Vec<_>>();
+        let either = matches!(measured, Measurement::Distance { .. });
+        let missing = missing.join(if either { " or " } else { " " });
         let (measurement, example) = (measured.word().to_string(), example.to_string());
         let similar = similar(columns, &names);
         (0, Box::new(Fault::MissingValue { measurement, missing, example, similar }))

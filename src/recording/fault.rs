@@ -70,7 +70,7 @@ pub enum RecordingFault {
         unit: String,
     },
     /// Direction of gravity in another frame than `w`, or in none.
-    #[error("direction of gravity is given in frame `{frame}`")]
+    #[error("direction of gravity is given {}", in_frame(frame))]
     GravityFrame {
         /// As written; empty where none is.
         frame: String,
@@ -177,7 +177,7 @@ pub enum RecordingFault {
         known: String,
     },
     /// A column without a name, or with a bracket too many or too few.
-    #[error("`{text}` is no column name with a unit")]
+    #[error("{} is no column name with a unit", quoted(text))]
     BadColumn {
         /// As written.
         text: String,
@@ -211,7 +211,7 @@ pub enum RecordingFault {
     MissingValue {
         /// The measurement.
         measurement: String,
-        /// The missing names, each in backquotes.
+        /// The missing names in backquotes.
         missing: String,
         /// A header row's part that would do.
         example: String,
@@ -308,7 +308,7 @@ impl RecordingFault {
             }
             Separator { .. } => "separate columns by commas, and write decimals with a point".into(),
             MisspeltKey { near, .. } => {
-                format!("write `{near}`; a comment that is no key needs no colon")
+                format!("write `{near}`; in a comment, leave the colon out")
             }
             KeyTwice { .. } => "keep one of the two lines".into(),
             LateKey { .. } => "move the line above the header row".into(),
@@ -338,6 +338,9 @@ impl RecordingFault {
             }
             UnknownUnit { expected, .. } => format!("write one of: {}", symbols(*expected)),
             WrongUnit { known, .. } => format!("write one of: {known}"),
+            BadColumn { text } if text.is_empty() => {
+                "write NAME[unit], as in `x[mm]`, or leave the empty column and its comma out".into()
+            }
             BadColumn { .. } => "write NAME[unit], as in `x[mm]`; a pure number is `NAME[1]`".into(),
             DuplicateColumn { .. } => "leave one of the two out, or give it another name".into(),
             MissingJoint { joint, similar: Some((number, name)), .. } => {
@@ -354,6 +357,12 @@ impl RecordingFault {
             }
             MissingValue { example, similar: None, .. } => format!("name the measured columns {example}"),
             TwoValues { .. } => "leave one of the two out; a recording holds one measurement".into(),
+            NotANumber { what, .. } if !what.starts_with("column") => {
+                "write a finite number with a decimal point".into()
+            }
+            NotUsable { what, .. } if !what.starts_with("column") => {
+                "write a finite number below 1e9 in m, rad".into()
+            }
             NotANumber { .. } => {
                 "write a number with a decimal point; a drop-out is an empty cell or `NaN`".into()
             }
@@ -377,6 +386,14 @@ impl RecordingFault {
             AllDropped { column, .. } => format!("write the numbers of column `{column}`"),
         }
     }
+}
+
+fn in_frame(frame: &str) -> String {
+    if frame.is_empty() { "without its frame".into() } else { format!("in frame `{frame}`") }
+}
+
+fn quoted(text: &str) -> String {
+    if text.is_empty() { "an empty field".into() } else { format!("`{text}`") }
 }
 
 /// Units of a quantity, or all of them.
