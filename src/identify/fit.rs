@@ -30,7 +30,7 @@ pub struct Fit {
     pub dropped: u64,
     /// Scalar readings used.
     pub readings: u64,
-    /// RMS of lengths over samples: with the machine as declared (set-ups fitted), and with the identified deviations, m.
+    /// RMS of lengths over samples: with the machine as declared (only what nobody has stated is fitted), and with the identified deviations, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_m: Option<BeforeAfter>,
     /// The same for angles, rad.
@@ -78,7 +78,7 @@ pub struct Fit {
 /// A figure before and after identification.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BeforeAfter {
-    /// Machine as declared, set-ups fitted.
+    /// Machine as declared, only what nobody has stated is fitted.
     pub nominal: f64,
     /// With constant deviations.
     pub geometric: f64,
