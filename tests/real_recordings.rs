@@ -26,7 +26,7 @@ impl Text {
         let text = std::fs::read_to_string(path).expect("readable");
         let (mut head, mut rows) = (Vec::new(), Vec::new());
         for line in text.lines() {
-            let of_head = line.starts_with('#') || !head.last().is_some_and(|l: &String| !l.starts_with('#'));
+            let of_head = line.starts_with('#') || head.last().is_none_or(|l: &String| l.starts_with('#'));
             if of_head { &mut head } else { &mut rows }.push(line.to_string());
         }
         Some(Text { name: format!("{file}.csv"), head, rows })

@@ -7,9 +7,7 @@ use kincal::identify::{Loss, fit_setup};
 use kincal::predict::{Prediction, predict};
 
 use super::Common;
-use super::output::{
-    Outcome, angle, check_outputs, count, length, open_machine, open_recording, write_whole,
-};
+use super::output::{Kind, Outcome, check_outputs, count, open_machine, open_recording, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -66,15 +64,12 @@ fn render(p: &Prediction, name: &str) -> String {
         text.push_str(&format!(", {} left out as drop-outs", count(p.dropped, "row", "rows")));
     }
     text.push('\n');
-    let kinds: [([Option<f64>; 3], fn(f64) -> String); 2] =
-        [([p.rms_m, p.max_m, p.mean_m], length), ([p.rms_rad, p.max_rad, p.mean_rad], angle)];
-    for (figures, show) in kinds {
-        if let [Some(rms), Some(max), Some(mean)] = figures {
+    for (figures, kind) in
+        [([p.rms_m, p.max_m, p.mean_m], Kind::Length), ([p.rms_rad, p.max_rad, p.mean_rad], Kind::Angle)]
+    {
+        if let [Some(rms), Some(max), Some(mean)] = figures.map(|x| x.map(|x| kind.show(x))) {
             text.push_str(&format!(
-                "residual (measured minus model): RMS {}, largest {}, mean {}\n",
-                show(rms),
-                show(max),
-                show(mean)
+                "residual (measured minus model): RMS {rms}, largest {max}, mean {mean}\n"
             ));
         }
     }
