@@ -156,6 +156,26 @@ impl CalibratedMachine {
         self.setups.iter().map(|(name, _)| name.as_str())
     }
 
+    /// Frame `w` of every fitted set-up in the frame before it, by the set-up's name.
+    pub fn setups(&self) -> impl Iterator<Item = (&str, Pose<f64>)> {
+        self.setups.iter().map(|(name, pose)| (name.as_str(), *pose))
+    }
+
+    /// Tool points that were found, by name, in frame `t`, m.
+    pub fn tool_points(&self) -> impl Iterator<Item = (&str, Vec3<f64>)> {
+        self.tool_points.iter().map(|(name, at)| (name.as_str(), *at))
+    }
+
+    /// Zeros that were found: set-up, joint or direction that they belong to, value in m or rad.
+    pub fn zeros(&self) -> impl Iterator<Item = (&str, &str, f64)> {
+        self.zeros.iter().map(|(setup, of, value)| (setup.as_str(), of.as_str(), *value))
+    }
+
+    /// Nominal lengths that were found, by set-up, m.
+    pub fn lengths(&self) -> impl Iterator<Item = (&str, f64)> {
+        self.lengths.iter().map(|(setup, value)| (setup.as_str(), *value))
+    }
+
     /// Samples that it was calibrated on.
     pub fn samples(&self) -> u64 {
         self.samples

@@ -50,10 +50,24 @@ pub fn demo(seed: u64) -> Result<Demo> {
             })?;
         let noise_seed = seed.wrapping_add(u64::from(degrees));
         let text = recording(&truth, &instrument, &path, &header, noise_seed);
+        // One clock for both: the second cone begins a minute after the first.
+        let text = later(&text, 60.0 * recordings.len() as f64);
         let name = format!("bk4_{degrees}deg.csv");
         recordings.push(Recording::from_bytes(&name, text.clone().into_bytes(), &machine)?);
         texts.push(text);
     }
     let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
     Ok(Demo { truth, recordings: texts, calibrated, fit })
+}
+
+/// The recording with its clock, the first column, so many seconds on.
+fn later(text: &str, seconds: f64) -> String {
+    let row = |line: &str| match line.split_once(',') {
+        Some((t, rest)) => match t.parse::<f64>() {
+            Ok(t) => format!("{:.3},{rest}\n", t + seconds),
+            Err(_) => format!("{line}\n"),
+        },
+        None => format!("{line}\n"),
+    };
+    text.lines().map(row).collect()
 }

@@ -58,7 +58,7 @@ const NOISE_ROUNDS: usize = 12;
 /// Identifies the deviations of `machine` from recordings, which may differ in kind and set-up.
 ///
 /// # Errors
-/// If a recording cannot be read, no joint moves, or there are fewer readings than a fit needs.
+/// If a recording cannot be read, no joint moves, or there are no more readings than the set-ups alone need.
 pub fn calibrate(
     machine: &Machine,
     recordings: &[Recording],
@@ -79,7 +79,20 @@ pub fn calibrate_with_progress(
 ) -> Result<(CalibratedMachine, Fit)> {
     let sources = Sources::new(recordings, machine, progress)?;
     enough_to_start(machine, &sources)?;
+    enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources);
+    let alone: usize = layout.blocks.iter().filter(|b| !b.prior).map(|b| b.len).sum();
+    if sources.readings() <= alone as u64 {
+        return Err(Error::Undetermined {
+            what: format!(
+                "{} scalar readings for {alone} unknowns of the set-ups: nothing is left to identify the machine from",
+                sources.readings()
+            ),
+            mend:
+                "record more poses, or declare what is known of the set-up (frame, tool point, zero, length)"
+                    .into(),
+        });
+    }
     let prior = options.prior && options.solver.uses_prior();
     let mut problem = Problem {
         machine,
@@ -118,6 +131,7 @@ pub fn fit_setup(
 ) -> Result<CalibratedMachine> {
     let machine = calibrated.machine();
     let sources = Sources::new(recordings, machine, &|_| {})?;
+    enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources);
     let problem = Problem {
         machine,
@@ -280,7 +294,7 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
     Ok(Found { solution, noise, seen })
 }
 
-/// Noise of every source from the residuals of its kind, freed of the parameters that the fit used up.
+/// Noise of every source from the residuals of its kind and stated `sigma`, freed of the parameters that the fit used up.
 fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Noise> {
     let sources = &problem.sources.all;
     let free = problem.layout.mask(|_| true);
@@ -289,7 +303,7 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
     } else {
         problem.free.iter().filter(|f| **f).count() as f64
     };
-    let kinds: Vec<_> = sources.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
+    let kinds: Vec<_> = sources.iter().map(source::Source::noise_group).collect();
     let rows = normal.tallies.iter().map(|t| t.length.inliers + t.angle.inliers).sum::<u64>() as f64;
     // Every scalar row bears its part of the parameters that are used up.
     let left = (1.0 - used / rows).max(0.05);
@@ -346,6 +360,42 @@ fn enough_to_start(machine: &Machine, sources: &Sources) -> Result<()> {
             what: "no joint moves in any recording: nothing of the machine can be identified".into(),
             mend: "record while the joints move through their travel".into(),
         });
+    }
+    Ok(())
+}
+
+/// Refuses set-ups and tool points that have fewer readings than unknowns of their own.
+fn enough_for_setups(sources: &Sources) -> Result<()> {
+    let readings = |pick: &dyn Fn(&source::Source) -> bool| -> u64 {
+        sources.all.iter().filter(|s| pick(s)).map(source::Source::readings).sum()
+    };
+    let mend = || "record more poses with this set-up, or declare what is known of it".to_string();
+    for (setup, name) in sources.setups.iter().enumerate() {
+        let frame = if sources.frame_unknown[setup] { 6 } else { 0 };
+        let lengths = sources.lengths.iter().filter(|s| **s == setup).count() as u64;
+        let needed = frame + lengths;
+        let has = readings(&|s| s.setup == setup && s.sees_frames());
+        if needed > 0 && has < needed {
+            let name = if name.is_empty() { "the set-up".into() } else { format!("set-up \"{name}\"") };
+            let of = match (frame > 0, lengths > 0) {
+                (true, true) => "frame w and length",
+                (true, false) => "frame w",
+                (false, _) => "length",
+            };
+            return Err(Error::Undetermined {
+                what: format!("{has} scalar readings for the {needed} unknowns of {name} ({of})"),
+                mend: mend(),
+            });
+        }
+    }
+    for (point, name) in sources.tool_points.iter().enumerate() {
+        let has = readings(&|s| s.tool_point.unknown() == Some(point) && s.sees_frames());
+        if (1..3).contains(&has) {
+            return Err(Error::Undetermined {
+                what: format!("{has} scalar readings for the 3 coordinates of tool point \"{name}\""),
+                mend: mend(),
+            });
+        }
     }
     Ok(())
 }

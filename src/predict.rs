@@ -120,7 +120,8 @@ pub fn predict(
                     _ => lengths.add(residuals),
                 }
                 if out.is_some() {
-                    tail = cells(&columns, measured, residuals, &sensor);
+                    let sign = quaternion_sign(recording, row.text, measured, &sensor);
+                    tail = cells(&columns, measured, residuals, &sensor, sign);
                 }
             }
             if let Some(out) = &mut out {
@@ -154,8 +155,12 @@ fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Re
         Some(chain) => Ok(chain),
         None if header.workpiece_frame_unknown && !matches!(sensor, Sensor::Joint { .. }) => {
             let known: Vec<&str> = calibrated.setup_names().collect();
+            let setup = match header.setup.as_str() {
+                "" => "the set-up".to_string(),
+                name => format!("set-up \"{name}\""),
+            };
             Err(missing(
-                format!("where set-up \"{}\" stands is not in the calibrated file", header.setup),
+                format!("where {setup} of this recording stands is not in the calibrated file"),
                 &known,
             ))
         }
@@ -164,11 +169,10 @@ fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Re
 }
 
 fn missing(what: String, known: &[&str]) -> Error {
-    let known = if known.is_empty() { "none".to_string() } else { known.join(", ") };
-    Error::Undetermined {
-        what,
-        mend: format!("add --fit-setup to find it from this recording; the file knows: {known}"),
-    }
+    let known: Vec<&str> = known.iter().copied().filter(|name| !name.is_empty()).collect();
+    let known =
+        if known.is_empty() { String::new() } else { format!("; the file knows: {}", known.join(", ")) };
+    Error::Undetermined { what, mend: format!("add --fit-setup to find it from this recording{known}") }
 }
 
 fn sensor_state(
@@ -238,7 +242,9 @@ fn write_head(out: &mut dyn Write, recording: &Recording, columns: &[Measured]) 
 }
 
 /// `,model,residual` of every measured column.
-fn cells(columns: &[Measured], measured: &[f64], residuals: &[f64], sensor: &Sensor) -> String {
+///
+/// `sign`: of the quaternion as written against the one with `qw` not negative.
+fn cells(columns: &[Measured], measured: &[f64], residuals: &[f64], sensor: &Sensor, sign: f64) -> String {
     let mut text = String::new();
     let mut put = |unit: Unit, model: f64, residual: f64| {
         text.push_str(&format!(",{:.12e},{:.6e}", unit.from_si(model), unit.from_si(residual)));
@@ -254,13 +260,12 @@ fn cells(columns: &[Measured], measured: &[f64], residuals: &[f64], sensor: &Sen
     let turn = |x: &[f64]| Pose::exp(Twist::new(Vec3([0.0; 3]), Vec3([x[0], x[1], x[2]])));
     let model = turn(&residuals[3..6]).inverse() * turn(&measured[3..6]);
     if columns.len() == 7 {
-        let q = |pose: Pose<f64>| {
-            let q = pose.to_isometry().rotation;
-            [q.w, q.i, q.j, q.k]
-        };
-        let (model, seen) = (q(model), q(turn(&measured[3..6])));
+        // A rotation has two quaternions: the model's is the one next to what was written.
+        let seen = quaternion(turn(&measured[3..6])).map(|c| sign * c);
+        let model = quaternion(model);
+        let near = if (0..4).map(|i| model[i] * seen[i]).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
         for i in 0..4 {
-            put(columns[3 + i].unit, model[i], seen[i] - model[i]);
+            put(columns[3 + i].unit, near * model[i], seen[i] - near * model[i]);
         }
     } else {
         let vector = model.rotation_vector();
@@ -269,4 +274,23 @@ fn cells(columns: &[Measured], measured: &[f64], residuals: &[f64], sensor: &Sen
         }
     }
     text
+}
+
+fn quaternion(pose: Pose<f64>) -> [f64; 4] {
+    let q = pose.to_isometry().rotation;
+    [q.w, q.i, q.j, q.k]
+}
+
+/// Whether a row's quaternion is written with the sign that [`quaternion`] gives (1) or with the other one (-1).
+fn quaternion_sign(recording: &Recording, row: &str, measured: &[f64], sensor: &Sensor) -> f64 {
+    let of = |i: usize| recording.columns().iter().position(|c| c.role == Role::Value(i));
+    if !matches!(sensor, Sensor::Pose) || of(6).is_none() {
+        return 1.0;
+    }
+    let turn = Twist::new(Vec3([0.0; 3]), Vec3([measured[3], measured[4], measured[5]]));
+    let seen = quaternion(Pose::exp(turn));
+    let largest = (0..4).max_by(|a, b| seen[*a].abs().total_cmp(&seen[*b].abs())).unwrap_or(0);
+    let written = of(3 + largest).and_then(|column| row.split(',').nth(column));
+    let written = written.and_then(|cell| cell.trim().trim_matches('"').trim().parse::<f64>().ok());
+    if written.is_some_and(|x| x * seen[largest] < 0.0) { -1.0 } else { 1.0 }
 }

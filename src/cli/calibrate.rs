@@ -6,10 +6,12 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use kincal::identify::{Fit, Loss, Options, Rms, Solver, calibrate_with_progress};
 use kincal::recording::Recording;
-use kincal::{CalibratedMachine, Error, Machine};
+use kincal::{CalibratedMachine, Machine};
 
 use super::Common;
-use super::output::{Outcome, angle, length, write_whole};
+use super::output::{
+    Kind, Outcome, angle, check_outputs, count, length, open_machine, open_recording, table, write_whole,
+};
 
 #[derive(Clone, Copy, ValueEnum)]
 enum SolverWord {
@@ -36,9 +38,10 @@ enum LossWord {
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Machine file
+    #[arg(value_name = "MACHINE.ron")]
     machine: PathBuf,
     /// Recordings
-    #[arg(required = true)]
+    #[arg(required = true, value_name = "REC.csv")]
     recordings: Vec<PathBuf>,
     /// Where to write the calibrated machine
     #[arg(short, long, value_name = "CALIBRATED.ron")]
@@ -47,19 +50,19 @@ pub(crate) struct Args {
     #[arg(long, value_enum, default_value = "lm")]
     solver: SolverWord,
     /// Damping of fixed-damping, relative to the largest diagonal element
-    #[arg(long, default_value_t = 1e-3)]
+    #[arg(long, default_value_t = 1e-3, value_parser = positive, allow_negative_numbers = true)]
     tau: f64,
     /// Steps of fixed-damping
     #[arg(long, default_value_t = 30)]
     steps: usize,
     /// Relative singular value below which rank-truncation takes a direction as not seen
-    #[arg(long, default_value_t = 1e-3)]
+    #[arg(long, default_value_t = 1e-3, value_parser = positive, allow_negative_numbers = true)]
     cut: f64,
     /// How residuals count
     #[arg(long, value_enum, default_value = "huber")]
     loss: LossWord,
     /// Tuning constant of the loss, standard deviations
-    #[arg(long)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     tuning: Option<f64>,
     /// Do not hold deviations near zero by the tolerances of the machine file
     #[arg(long)]
@@ -91,19 +94,13 @@ impl Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let machine = Machine::open(&args.machine)?;
+    check_outputs(&[args.output.as_deref(), args.common.json_file()], &args.recordings)?;
+    let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings: Vec<Recording> =
-        args.recordings.iter().map(|path| Recording::open(path, &machine)).collect::<Result<_, _>>()?;
-    let spinner = args.common.spinner();
-    let progress = |text: &str| {
-        if let Some(spinner) = &spinner {
-            spinner.set_message(text.to_string());
-        }
-    };
-    let found = calibrate_with_progress(&machine, &recordings, args.options(), &progress);
-    if let Some(spinner) = spinner {
-        spinner.finish_and_clear();
-    }
+        args.recordings.iter().map(|path| open_recording(path, &machine)).collect::<Result<_, _>>()?;
+    let progress = args.common.progress();
+    let found = calibrate_with_progress(&machine, &recordings, args.options(), &|text| progress.say(text));
+    drop(progress);
     let (calibrated, fit) = found?;
     let mut text = render(&fit, args.all);
     if let Some(path) = &args.output {
@@ -114,10 +111,21 @@ pub(crate) fn run(args: &Args) -> Outcome {
     args.common.write_json(&fit)
 }
 
+/// A number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("expected a number above zero".into()),
+    }
+}
+
 /// Writes a calibrated machine whole or not at all.
-pub(crate) fn write_machine(path: &std::path::Path, calibrated: &CalibratedMachine) -> kincal::Result<()> {
-    let failed = |source| Error::File { path: path.to_path_buf(), source };
-    write_whole(path, |out| out.write_all(calibrated.to_ron().as_bytes()).map_err(failed))
+pub(crate) fn write_machine(path: &std::path::Path, calibrated: &CalibratedMachine) -> Outcome {
+    write_whole(path, |out| {
+        // An error is told of the output by `write_whole`.
+        let _ = out.write_all(calibrated.to_ron().as_bytes());
+        Ok(())
+    })
 }
 
 fn rms(rms: &Rms) -> String {
@@ -127,55 +135,49 @@ fn rms(rms: &Rms) -> String {
 
 /// The result as people read it.
 pub(crate) fn render(fit: &Fit, all: bool) -> String {
-    let mut text = format!("{}: {} samples in {} recordings", fit.machine, fit.samples, fit.recordings.len());
+    let recordings = count(fit.recordings.len() as u64, "recording", "recordings");
+    let mut text = format!("{}: {} in {recordings}", fit.machine, count(fit.samples, "sample", "samples"));
     if fit.dropped > 0 {
-        let _ = write!(text, ", {} rows left out as drop-outs", fit.dropped);
+        let _ = write!(text, ", {} left out as drop-outs", count(fit.dropped, "row", "rows"));
     }
-    text.push_str("\n\nRMS of the residuals\n");
-    let _ = writeln!(
-        text,
-        "  {:<28}{:<14}{:>8}  {:>20}  {:>20}",
-        "recording", "measurement", "samples", "as declared", "calibrated"
-    );
+    text.push_str("\n\nRMS of the residuals (measured minus model)\n");
+    let words = |words: [&str; 6]| words.map(String::from).to_vec();
+    let named = fit.recordings.iter().any(|r| !r.setup.is_empty());
+    let setup = if named { "set-up" } else { "" };
+    let mut rows = vec![words(["recording", setup, "measurement", "samples", "as declared", "calibrated"])];
     for r in &fit.recordings {
-        let _ = writeln!(
-            text,
-            "  {:<28}{:<14}{:>8}  {:>20}  {:>20}",
-            r.name,
-            r.measurement,
-            r.samples,
-            rms(&r.nominal),
-            rms(&r.geometric)
-        );
+        let (samples, before, after) = (r.samples.to_string(), rms(&r.nominal), rms(&r.geometric));
+        rows.push(words([&r.name, &r.setup, &r.measurement, &samples, &before, &after]));
     }
-    for (pair, show) in [(fit.rms_m, length as fn(f64) -> String), (fit.rms_rad, angle)] {
-        if let Some(pair) = pair {
-            let _ =
-                writeln!(text, "  {:<50}  {:>20}  {:>20}", "all", show(pair.nominal), show(pair.geometric));
+    for (pair, kind) in [(fit.rms_m, Kind::Length), (fit.rms_rad, Kind::Angle)] {
+        if let Some(pair) = pair.filter(|_| fit.recordings.len() > 1) {
+            let [before, after] = [pair.nominal, pair.geometric].map(|x| kind.show(x));
+            rows.push(words(["all", "", "", "", &before, &after]));
         }
     }
+    text.push_str(&table("  ", &[false, false, false, true, true, true], &rows));
     let _ = writeln!(
         text,
-        "\n{} of {} combinations of the unknowns are seen; {} steps, {}",
-        fit.rank, fit.unknowns, fit.steps, fit.stop
+        "\n{} of {} combinations of the unknowns are seen; {}, {}",
+        fit.rank,
+        fit.unknowns,
+        count(fit.steps as u64, "step", "steps"),
+        fit.stop
     );
     let shown: Vec<_> = fit.parameters.iter().filter(|p| all || p.share > 0.5).collect();
     if !shown.is_empty() {
         let heading = if all { "deviations" } else { "deviations that come mostly from the data" };
         let _ = writeln!(text, "\n{heading} (value ± standard error, share of the data)");
     }
+    let mut rows = Vec::new();
     for p in shown {
         let name = if p.setup.is_empty() { p.frame.clone() } else { format!("{}[{}]", p.frame, p.setup) };
-        let show = if p.component.starts_with('v') { length } else { angle };
-        let _ = writeln!(
-            text,
-            "  {name:<16} {}  {:>14} ± {:<12} {:>4.0} %",
-            p.component,
-            show(p.value),
-            show(p.std_error),
-            100.0 * p.share
-        );
+        let kind = if p.component.starts_with('v') { Kind::Length } else { Kind::Angle };
+        let (value, error, unit) = kind.show_with_error(p.value, p.std_error);
+        let share = format!("{:.0} %", 100.0 * p.share);
+        rows.push(vec![name, p.component.clone(), value, format!("± {error} {unit}"), share]);
     }
+    text.push_str(&table("  ", &[false, false, true, false, true], &rows));
     let seen = fit.combinations.iter().filter(|c| c.share > 0.5).count();
     let _ = writeln!(
         text,
@@ -185,7 +187,7 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
     for suspect in fit.suspects.iter().take(5) {
         let _ = writeln!(
             text,
-            "down-weighted: {} line {}, off by {:.1} standard deviations (weight {:.2})",
+            "far off: {} line {}, by {:.1} standard deviations (weight {:.2})",
             suspect.recording, suspect.line, suspect.deviations, suspect.weight
         );
     }

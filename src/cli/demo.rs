@@ -6,7 +6,7 @@ use kincal::demo::demo;
 
 use super::Common;
 use super::calibrate::render;
-use super::output::{Outcome, length};
+use super::output::{Outcome, check_outputs, length};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -18,6 +18,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
+    check_outputs(&[args.common.json_file()], &[])?;
     let demo = demo(args.seed)?;
     let mut text = format!(
         "The AC table-tilting reference machine, with random errors of its declared tolerances in every frame, is measured by a \

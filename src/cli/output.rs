@@ -1,11 +1,12 @@
 //! What reaches people and files: messages, numbers with units, whole files.
 
-use std::io::{IsTerminal, Write};
-use std::path::Path;
+use std::io::{IsTerminal, Read, Write};
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use kincal::{Error, Place};
+use kincal::recording::Recording;
+use kincal::{Error, Machine, Place};
 
 use super::Common;
 
@@ -15,6 +16,8 @@ pub(crate) enum Failure {
     Input(Error),
     /// The command did its work, and the answer is no.
     Answer(String),
+    /// What the command line itself found wrong, and the mend.
+    Told { what: String, mend: String },
 }
 
 impl From<Error> for Failure {
@@ -24,26 +27,66 @@ impl From<Error> for Failure {
 }
 
 /// Result of a command.
-pub(crate) type Outcome = Result<(), Failure>;
+pub(crate) type Outcome<T = ()> = Result<T, Failure>;
 
 /// The message, the line it is about, and the mend.
 pub(crate) fn complain(failure: &Failure) {
     let mut err = std::io::stderr().lock();
-    let error = match failure {
-        Failure::Answer(text) => {
-            let _ = writeln!(err, "{text}");
-            return;
-        }
-        Failure::Input(error) => error,
+    let (what, excerpt, mend) = match failure {
+        Failure::Answer(text) => (text.clone(), None, String::new()),
+        Failure::Told { what, mend } => (what.clone(), None, mend.clone()),
+        Failure::Input(error) => (error.to_string(), error.place().and_then(excerpt), error.mend()),
     };
-    let _ = writeln!(err, "error: {error}");
-    if let Some(excerpt) = error.place().and_then(excerpt) {
+    let _ = writeln!(err, "error: {what}");
+    if let Some(excerpt) = excerpt {
         let _ = writeln!(err, "{excerpt}");
     }
-    let mend = error.mend();
     if !mend.is_empty() {
         let _ = writeln!(err, "  = {mend}");
     }
+}
+
+/// What a file seems to be, where one was given in the other's place.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Looks {
+    Machine,
+    Recording,
+}
+
+/// By its first bytes: a recording begins with `#`, a machine file with a comment `//`, `Machine` or a bracket.
+fn looks_like(path: &Path) -> Option<Looks> {
+    let mut start = Vec::new();
+    std::fs::File::open(path).ok()?.take(4096).read_to_end(&mut start).ok()?;
+    let text = String::from_utf8_lossy(&start);
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    if ["//", "/*", "Machine", "("].iter().any(|word| text.starts_with(word)) {
+        Some(Looks::Machine)
+    } else {
+        text.starts_with('#').then_some(Looks::Recording)
+    }
+}
+
+fn misplaced(path: &Path, is: &str, expected: &str) -> Failure {
+    Failure::Told {
+        what: format!("{}: this is a {is}, where a {expected} is expected", path.display()),
+        mend: "name the machine file first, then the recordings".into(),
+    }
+}
+
+/// Opens a machine file by `open`; a recording in its place is told as such.
+pub(crate) fn open_machine<T>(path: &Path, open: impl FnOnce(&Path) -> kincal::Result<T>) -> Outcome<T> {
+    open(path).map_err(|error| match looks_like(path) {
+        Some(Looks::Recording) => misplaced(path, "recording", "machine file"),
+        _ => error.into(),
+    })
+}
+
+/// Opens a recording; a machine file in its place is told as such.
+pub(crate) fn open_recording(path: &Path, machine: &Machine) -> Outcome<Recording> {
+    Recording::open(path, machine).map_err(|error| match looks_like(path) {
+        Some(Looks::Machine) => misplaced(path, "machine file", "recording"),
+        _ => error.into(),
+    })
 }
 
 /// The line of a text file that a message is about, with a mark below the column (machine files only: a recording's
@@ -68,20 +111,95 @@ fn excerpt(place: &Place) -> Option<String> {
     Some(format!("{gap} |\n{number} | {line}\n{gap} | {before}^"))
 }
 
+/// A file that cannot be written, and why.
+fn not_written(path: &Path, source: &std::io::Error) -> Failure {
+    let folder = folder_of(path);
+    let mend = if !folder.exists() {
+        format!("create the folder {} first, or write elsewhere", folder.display())
+    } else if !folder.is_dir() {
+        format!("{} is no folder; write elsewhere", folder.display())
+    } else if path.is_dir() {
+        "name a file, not a folder".into()
+    } else {
+        "write where there is space and leave to write".into()
+    };
+    Failure::Told { what: format!("{}: cannot be written: {source}", path.display()), mend }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Refuses outputs that cannot be written before any work is done, and those that would overwrite a recording.
+pub(crate) fn check_outputs(outputs: &[Option<&Path>], recordings: &[PathBuf]) -> Outcome {
+    for path in outputs.iter().copied().flatten() {
+        let same = |other: &PathBuf| match (path.canonicalize(), other.canonicalize()) {
+            (Ok(a), Ok(b)) => a == b,
+            _ => false,
+        };
+        if recordings.iter().any(same) {
+            return Err(Failure::Told {
+                what: format!("{}: the output is one of the recordings", path.display()),
+                mend: "give the output another name; recordings are never overwritten".into(),
+            });
+        }
+        if path.is_dir() {
+            return Err(not_written(path, &std::io::ErrorKind::IsADirectory.into()));
+        }
+        match std::fs::metadata(folder_of(path)) {
+            Ok(folder) if !folder.is_dir() => {
+                return Err(not_written(path, &std::io::ErrorKind::NotADirectory.into()));
+            }
+            Ok(_) => {}
+            Err(source) => return Err(not_written(path, &source)),
+        }
+    }
+    Ok(())
+}
+
+/// A writer that keeps the error that it met, so that it is told of the output and not of the input.
+struct Watched<W> {
+    inner: W,
+    failed: Option<std::io::Error>,
+}
+
+impl<W: Write> Watched<W> {
+    fn watch<T>(&mut self, result: std::io::Result<T>) -> std::io::Result<T> {
+        result.inspect_err(|e| {
+            self.failed = Some(e.raw_os_error().map_or(e.kind().into(), std::io::Error::from_raw_os_error));
+        })
+    }
+}
+
+impl<W: Write> Write for Watched<W> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let result = self.inner.write(bytes);
+        self.watch(result)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        let result = self.inner.flush();
+        self.watch(result)
+    }
+}
+
 /// Writes a file whole or not at all: into a neighbour first, then renamed.
-pub(crate) fn write_whole(
-    path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> kincal::Result<()>,
-) -> kincal::Result<()> {
-    let failed = |source| Error::File { path: path.to_path_buf(), source };
+pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> kincal::Result<()>) -> Outcome {
+    let failed = |source: std::io::Error| not_written(path, &source);
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".part{}", std::process::id()));
     let part = path.with_file_name(name);
     let result = (|| {
         let file = std::fs::File::create(&part).map_err(failed)?;
-        let mut out = std::io::BufWriter::with_capacity(1 << 18, file);
-        write(&mut out)?;
+        let inner = std::io::BufWriter::with_capacity(1 << 18, file);
+        let mut out = Watched { inner, failed: None };
+        let written = write(&mut out);
+        if let Some(source) = out.failed.take() {
+            return Err(failed(source));
+        }
+        written?;
         out.flush().map_err(failed)?;
+        drop(out);
         std::fs::rename(&part, path).map_err(failed)
     })();
     if result.is_err() {
@@ -90,19 +208,48 @@ pub(crate) fn write_whole(
     result
 }
 
+/// A spinner on standard error while something lasts; gone when it is dropped.
+pub(crate) struct Progress(Option<ProgressBar>);
+
+impl Progress {
+    pub fn say(&self, text: &str) {
+        if let Some(spinner) = &self.0 {
+            spinner.set_message(text.to_string());
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(spinner) = &self.0 {
+            spinner.finish_and_clear();
+        }
+    }
+}
+
 impl Common {
+    /// The file that the machine-readable result goes to, if it goes to one.
+    pub(crate) fn json_file(&self) -> Option<&Path> {
+        self.json.as_deref().filter(|target| *target != "-").map(Path::new)
+    }
+
     /// Writes the machine-readable result where it was asked for.
     pub(crate) fn write_json(&self, value: &impl serde::Serialize) -> Outcome {
-        let Some(target) = &self.json else { return Ok(()) };
-        let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Answer(format!("error: {e}")))?;
-        if target == "-" {
-            print(&format!("{text}\n"));
+        if self.json.is_none() {
             return Ok(());
         }
-        let path = Path::new(target);
-        let failed = |source| Error::File { path: path.to_path_buf(), source };
-        write_whole(path, |out| writeln!(out, "{text}").map_err(failed))?;
-        Ok(())
+        let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Answer(e.to_string()))?;
+        match self.json_file() {
+            None => {
+                print(&format!("{text}\n"));
+                Ok(())
+            }
+            Some(path) => write_whole(path, |out| {
+                // Watched: an error here is told of the output.
+                let _ = writeln!(out, "{text}");
+                Ok(())
+            }),
+        }
     }
 
     /// Prints for people, unless standard output belongs to JSON or nobody wants to read.
@@ -113,13 +260,13 @@ impl Common {
     }
 
     /// A spinner on standard error if that is a terminal.
-    pub(crate) fn spinner(&self) -> Option<ProgressBar> {
+    pub(crate) fn progress(&self) -> Progress {
         if self.quiet || !std::io::stderr().is_terminal() {
-            return None;
+            return Progress(None);
         }
         let spinner = ProgressBar::new_spinner();
         spinner.enable_steady_tick(Duration::from_millis(120));
-        Some(spinner)
+        Progress(Some(spinner))
     }
 }
 
@@ -128,28 +275,94 @@ pub(crate) fn print(text: &str) {
     let _ = std::io::stdout().lock().write_all(text.as_bytes());
 }
 
+/// `1 recording`, `2 recordings`.
+pub(crate) fn count(n: u64, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+/// A display unit: its symbol and how many of it make 1 m or 1 rad.
+#[derive(Clone, Copy)]
+pub(crate) struct Shown {
+    pub symbol: &'static str,
+    pub per_si: f64,
+}
+
+/// What a number of a report measures.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Length,
+    Angle,
+}
+
+impl Kind {
+    /// The unit that suits a number of this size, m or rad.
+    pub fn unit(self, size: f64) -> Shown {
+        let shown = |symbol, per_si| Shown { symbol, per_si };
+        match (self, size.abs()) {
+            (Kind::Length, a) if a < 1e-4 => shown("um", 1e6),
+            (Kind::Length, a) if a < 1.0 => shown("mm", 1e3),
+            (Kind::Length, _) => shown("m", 1.0),
+            (Kind::Angle, a) if a < 1e-3 => shown("urad", 1e6),
+            (Kind::Angle, a) if a < 0.02 => shown("mrad", 1e3),
+            (Kind::Angle, _) => shown("deg", 1f64.to_degrees()),
+        }
+    }
+
+    /// A number with a unit that suits its size; what is below a millionth of the smallest unit is rounding.
+    pub fn show(self, si: f64) -> String {
+        let unit = self.unit(si);
+        let value = si * unit.per_si;
+        if value.abs() < 1e-6 {
+            return format!("0 {}", unit.symbol);
+        }
+        format!("{value:.*} {}", decimals(value, 3), unit.symbol)
+    }
+
+    /// A value with its sign, its standard error to two digits, and the unit that both share.
+    pub fn show_with_error(self, value: f64, error: f64) -> (String, String, &'static str) {
+        let size = if error.is_finite() { value.abs().max(error) } else { value.abs() };
+        let unit = self.unit(size);
+        let (value, error) = (value * unit.per_si, error * unit.per_si);
+        if !error.is_finite() {
+            return (format!("{value:+.*}", decimals(value, 3)), "inf".into(), unit.symbol);
+        }
+        let places = decimals(error, 2);
+        (format!("{value:+.places$}"), format!("{error:.places$}"), unit.symbol)
+    }
+}
+
 /// A length with a unit that suits its size.
 pub(crate) fn length(m: f64) -> String {
-    match m.abs() {
-        a if a == 0.0 => "0 um".into(),
-        a if a < 1e-4 => format!("{} um", three(m * 1e6)),
-        a if a < 1.0 => format!("{} mm", three(m * 1e3)),
-        _ => format!("{} m", three(m)),
-    }
+    Kind::Length.show(m)
 }
 
 /// An angle with a unit that suits its size.
 pub(crate) fn angle(rad: f64) -> String {
-    match rad.abs() {
-        a if a == 0.0 => "0 urad".into(),
-        a if a < 1e-3 => format!("{} urad", three(rad * 1e6)),
-        a if a < 0.02 => format!("{} mrad", three(rad * 1e3)),
-        _ => format!("{} deg", three(rad.to_degrees())),
-    }
+    Kind::Angle.show(rad)
 }
 
-/// Three significant digits without exponent.
-fn three(x: f64) -> String {
-    let digits = 2 - x.abs().max(1e-9).log10().floor() as i32;
-    format!("{x:.*}", digits.clamp(0, 6) as usize)
+/// Decimals that show so many significant digits.
+pub(crate) fn decimals(x: f64, digits: i32) -> usize {
+    (digits - 1 - x.abs().max(1e-9).log10().floor() as i32).clamp(0, 6) as usize
+}
+
+/// Rows as columns of text, each as wide as its widest cell; `right` says which columns stand to the right.
+pub(crate) fn table(indent: &str, right: &[bool], rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for row in rows {
+        let mut line = indent.to_string();
+        for (c, cell) in row.iter().enumerate().filter(|(c, _)| widths[*c] > 0) {
+            let gap = " ".repeat(widths[c] - cell.chars().count());
+            let padded =
+                if right.get(c) == Some(&true) { format!("{gap}{cell}") } else { format!("{cell}{gap}") };
+            line.push_str(if c == 0 { "" } else { "  " });
+            line.push_str(&padded);
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
 }

@@ -5,16 +5,17 @@ use std::path::PathBuf;
 use kincal::CalibratedMachine;
 use kincal::identify::{Loss, fit_setup};
 use kincal::predict::{Prediction, predict};
-use kincal::recording::Recording;
 
 use super::Common;
-use super::output::{Outcome, angle, length, write_whole};
+use super::output::{Kind, Outcome, check_outputs, count, open_machine, open_recording, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Machine file, calibrated or not
+    #[arg(value_name = "CALIBRATED.ron")]
     machine: PathBuf,
     /// Recording
+    #[arg(value_name = "REC.csv")]
     recording: PathBuf,
     /// Where to write the recording with model and residual columns
     #[arg(short, long, value_name = "OUT.csv")]
@@ -27,14 +28,18 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let mut calibrated = CalibratedMachine::open(&args.machine)?;
-    let recordings = [Recording::open(&args.recording, calibrated.machine())?];
-    let spinner = args.common.spinner();
+    check_outputs(&[args.output.as_deref(), args.common.json_file()], std::slice::from_ref(&args.recording))?;
+    let mut calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
+    let recordings = [open_recording(&args.recording, calibrated.machine())?];
+    let progress = args.common.progress();
     if args.fit_setup {
+        progress.say("finding the set-up");
         calibrated = fit_setup(&calibrated, &recordings, Loss::default())?;
     } else {
+        progress.say(&format!("reading {}", recordings[0].name()));
         recordings[0].scan()?;
     }
+    progress.say(&format!("predicting {}", recordings[0].name()));
     let mut prediction = None;
     match &args.output {
         None => prediction = Some(predict(&calibrated, &recordings[0], None)?),
@@ -43,36 +48,35 @@ pub(crate) fn run(args: &Args) -> Outcome {
             Ok(())
         })?,
     }
-    if let Some(spinner) = spinner {
-        spinner.finish_and_clear();
-    }
+    drop(progress);
     let Some(prediction) = prediction else { return Ok(()) };
-    args.common.say(&render(&prediction, recordings[0].name()));
+    let mut text = render(&prediction, recordings[0].name());
+    if let Some(path) = &args.output {
+        text.push_str(&format!("written to {}\n", path.display()));
+    }
+    args.common.say(&text);
     args.common.write_json(&prediction)
 }
 
 fn render(p: &Prediction, name: &str) -> String {
-    let mut text = format!("{name}: {} samples", p.samples);
+    let mut text = format!("{name}: {}", count(p.samples, "sample", "samples"));
     if p.dropped > 0 {
-        text.push_str(&format!(", {} rows left out as drop-outs", p.dropped));
+        text.push_str(&format!(", {} left out as drop-outs", count(p.dropped, "row", "rows")));
     }
     text.push('\n');
-    let kinds: [([Option<f64>; 3], fn(f64) -> String); 2] =
-        [([p.rms_m, p.max_m, p.mean_m], length), ([p.rms_rad, p.max_rad, p.mean_rad], angle)];
-    for (figures, show) in kinds {
-        if let [Some(rms), Some(max), Some(mean)] = figures {
+    for (figures, kind) in
+        [([p.rms_m, p.max_m, p.mean_m], Kind::Length), ([p.rms_rad, p.max_rad, p.mean_rad], Kind::Angle)]
+    {
+        if let [Some(rms), Some(max), Some(mean)] = figures.map(|x| x.map(|x| kind.show(x))) {
             text.push_str(&format!(
-                "residual: RMS {}, largest {}, mean {}\n",
-                show(rms),
-                show(max),
-                show(mean)
+                "residual (measured minus model): RMS {rms}, largest {max}, mean {mean}\n"
             ));
         }
     }
     if p.extrapolated_samples > 0 {
         text.push_str(&format!(
-            "note: at {} samples a joint leaves the range that the calibration has seen\n",
-            p.extrapolated_samples
+            "note: at {} a joint leaves the range that the calibration has seen\n",
+            count(p.extrapolated_samples, "sample", "samples")
         ));
     }
     text

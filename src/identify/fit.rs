@@ -31,7 +31,7 @@ pub struct Fit {
     pub dropped: u64,
     /// Scalar readings used.
     pub readings: u64,
-    /// RMS of lengths over samples: with the machine as declared (set-ups fitted), and with the identified deviations, m.
+    /// RMS of lengths over samples: with the machine as declared (only what nobody has stated is fitted), and with the identified deviations, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_m: Option<BeforeAfter>,
     /// The same for angles, rad.
@@ -81,7 +81,7 @@ pub struct Fit {
 /// A figure before and after identification.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BeforeAfter {
-    /// Machine as declared, set-ups fitted.
+    /// Machine as declared, only what nobody has stated is fitted.
     pub nominal: f64,
     /// With constant deviations.
     pub geometric: f64,
@@ -196,7 +196,7 @@ pub(super) fn report(
             }
         })
         .collect();
-    let readings: u64 = sources.all.iter().map(|s| s.summary.samples * s.sensor.reading_count() as u64).sum();
+    let readings = sources.readings();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
     let rank_in_general = Information::new(&general, layout, problem.prior, 0).rank;
     let (outliers, suspects) = suspects(problem, found)?;
@@ -411,6 +411,12 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
             still(machine, problem)
         ));
     }
+    if fit.combinations.iter().all(|c| c.share < 1e-6) {
+        warnings.push(
+            "no constant deviation of the machine shows in these recordings; only what belongs to the set-up was found"
+                .into(),
+        );
+    }
     for open in &fit.open {
         warnings.push(format!("not seen by the recordings, left as declared: {open}"));
     }
@@ -429,20 +435,30 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
             "frame {frame} lies {size:.0} tolerances from where the machine file has it: check its declaration, or state a larger tolerance there"
         ));
     }
-    for recording in fit.recordings.iter().filter(|r| r.birge.is_some_and(|b| b > 2.0)) {
+    // Recordings of one kind share their noise, and often the figure: one sentence for all of them.
+    let mut above: Vec<(String, Vec<&str>)> = Vec::new();
+    for recording in &fit.recordings {
+        let Some(birge) = recording.birge.filter(|b| *b > 2.0) else { continue };
+        let figure = format!("{birge:.1}");
+        match above.iter_mut().find(|(known, _)| *known == figure) {
+            Some((_, names)) => names.push(&recording.name),
+            None => above.push((figure, vec![&recording.name])),
+        }
+    }
+    for (figure, names) in above {
         warnings.push(format!(
-            "{}: residuals are {:.1} times the stated sigma: something besides constant geometry is at work",
-            recording.name,
-            recording.birge.unwrap_or(1.0)
+            "{}: residuals are {figure} times the stated sigma: something besides constant geometry is at work",
+            names.join(", ")
         ));
     }
+    let samples = |n: u64| if n == 1 { "1 sample".to_string() } else { format!("{n} samples") };
     if fit.outliers > 0 {
-        warnings.push(format!(
-            "{} samples lie further off than noise explains; {} of them count less than half",
-            fit.outliers, fit.down_weighted
-        ));
-    } else if fit.down_weighted > 0 {
-        warnings.push(format!("{} samples count less than half because they lie far off", fit.down_weighted));
+        let lies = if fit.outliers == 1 { "lies" } else { "lie" };
+        warnings.push(format!("{} {lies} further off than noise explains", samples(fit.outliers)));
+    }
+    if fit.down_weighted > 0 {
+        let counts = if fit.down_weighted == 1 { "counts" } else { "count" };
+        warnings.push(format!("{} {counts} less than half for lying far off", samples(fit.down_weighted)));
     }
     if fit.stop == Stop::Steps && !matches!(fit.solver, Solver::FixedDamping { .. }) {
         warnings.push("the number of steps was used up before the fit settled".into());

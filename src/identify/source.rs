@@ -60,6 +60,17 @@ impl Source<'_> {
         self.sensor.quantity(i, prismatic)
     }
 
+    /// Recordings that share their noise have the same one of these: kind of instrument and stated `sigma`.
+    pub fn noise_group(&self) -> (std::mem::Discriminant<Sensor>, Option<u64>) {
+        let stated = self.recording.header().sigma.map(|s| s.value.to_bits());
+        (std::mem::discriminant(&self.sensor), stated)
+    }
+
+    /// Scalar readings in all samples.
+    pub fn readings(&self) -> u64 {
+        self.summary.samples * self.sensor.reading_count() as u64
+    }
+
     /// Whether frames `w` and `t` enter the readings.
     pub fn sees_frames(&self) -> bool {
         !matches!(self.sensor, Sensor::Joint { .. })
@@ -144,6 +155,11 @@ impl<'a> Sources<'a> {
     /// Samples in all recordings.
     pub fn samples(&self) -> u64 {
         self.all.iter().map(|s| s.summary.samples).sum()
+    }
+
+    /// Scalar readings in all recordings.
+    pub fn readings(&self) -> u64 {
+        self.all.iter().map(Source::readings).sum()
     }
 
     /// One pass over all samples: `work` on every chunk, on all cores; `merge` in the order of the files, so that the same

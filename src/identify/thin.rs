@@ -46,7 +46,7 @@ pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
     Ok(all)
 }
 
-/// Robust noise of each source from the median of its residuals; sources of one kind share it.
+/// Robust noise of each source from the median of its residuals; sources of one kind and stated `sigma` share it.
 pub(crate) fn robust_noise(
     machine: &Machine,
     sources: &Sources,
@@ -54,7 +54,7 @@ pub(crate) fn robust_noise(
     unknowns: &Unknowns,
 ) -> Vec<Noise> {
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
-    let kinds: Vec<_> = sources.all.iter().map(|s| std::mem::discriminant(&s.sensor)).collect();
+    let kinds: Vec<_> = sources.all.iter().map(|s| s.noise_group()).collect();
     let mut sizes: Vec<[Vec<f64>; 2]> = sources.all.iter().map(|_| Default::default()).collect();
     for sample in thin {
         let (evaluator, source) = (&evaluators[sample.source], &sources.all[sample.source]);
