@@ -134,7 +134,7 @@ fn down_weighted_samples_are_counted_and_listed() {
     let (rest, reading) = row.rsplit_once(',').expect("columns");
     let spoilt = format!("{rest},{}", reading.parse::<f64>().expect("a number") + 1e-3);
     let fit = case.fit(text.replace(&row, &spoilt));
-    assert_warns(&fit, "1 sample counts less than half because it lies far off");
+    assert_warns(&fit, "1 sample lies further off than noise explains; 1 counted less than half");
     assert_eq!((fit.down_weighted, fit.suspects.len(), fit.suspects[0].line), (1, 1, 11));
 }
 

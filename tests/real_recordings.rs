@@ -1,7 +1,7 @@
 //! Recordings of real machines, other people's data beside the project: geometry alone, judged where it was not fitted.
 //!
-//! `cargo test --release --test real_recordings -- --nocapture` prints the figures of `docs/accuracy.md`; with `--include-ignored`
-//! also how losses and tolerances compare.
+//! `cargo test --release --test real_recordings -- --nocapture` prints the figures of `docs/accuracy.md`; with
+//! `KINCAL_COMPARE=1` also how losses and tolerances compare.
 
 mod common;
 
@@ -330,9 +330,20 @@ fn fanuc_r2000ic_at_a_pose_that_was_left_out() {
     reaches(fanuc(), &[("fanuc_r2000ic", 0.17, 0.235)]);
 }
 
+/// Comparisons are for reading, and take minutes: only on demand.
+fn wanted() -> bool {
+    let wanted = std::env::var_os("KINCAL_COMPARE").is_some();
+    if !wanted {
+        println!("skipped: set KINCAL_COMPARE=1 to see this comparison");
+    }
+    wanted
+}
+
 #[test]
-#[ignore = "a comparison to read, not a test"]
 fn losses_side_by_side() {
+    if !wanted() {
+        return;
+    }
     let losses = [
         ("squares", Loss::Squares),
         ("huber 3", Loss::Huber { k: 3.0 }),
@@ -358,8 +369,10 @@ fn with_tolerance(machine: &Machine, mm: f64, deg: f64) -> Machine {
 }
 
 #[test]
-#[ignore = "a comparison to read, not a test"]
 fn tolerances_side_by_side() {
+    if !wanted() {
+        return;
+    }
     const DEGREES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
     for set in all() {
         let folds = set.folds();

@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
 use super::solve::Problem;
@@ -66,7 +67,9 @@ pub struct Fit {
     pub setups: Vec<SetupFit>,
     /// Samples with a weight below one half.
     pub down_weighted: u64,
-    /// The worst of them.
+    /// Samples further off than the noise would bring one in a hundred recordings like these, whatever their weight.
+    pub outliers: u64,
+    /// The worst of both, one by one.
     pub suspects: Vec<Suspect>,
     /// What to be careful about, in sentences.
     pub warnings: Vec<String>,
@@ -196,7 +199,7 @@ pub(super) fn report(
     let readings = sources.readings();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
     let rank_in_general = Information::new(&general, layout, problem.prior, 0).rank;
-    let suspects = suspects(problem, found)?;
+    let (outliers, suspects) = suspects(problem, found)?;
     let fit = Fit {
         machine: machine.name().into(),
         samples: sources.samples(),
@@ -219,6 +222,7 @@ pub(super) fn report(
         open: information.open.iter().map(|v| in_words(problem, v)).collect(),
         setups: setups(problem, found),
         down_weighted: tallies.iter().map(|t| t.down_weighted).sum(),
+        outliers,
         suspects,
         warnings: Vec::new(),
         information,
@@ -321,30 +325,30 @@ fn in_words(problem: &Problem, vector: &DVector<f64>) -> String {
     named.join(" ")
 }
 
-/// One more pass: which samples counted little, and why.
-fn suspects(problem: &Problem, found: &Found) -> Result<Vec<Suspect>> {
+/// One more pass: how many samples lie further off than noise explains, and which samples are the worst.
+fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
     let (machine, sources) = (problem.machine, problem.sources);
     let unknowns = &found.solution.unknowns;
-    if found.solution.normal.tallies.iter().all(|t| t.down_weighted == 0) {
-        return Ok(Vec::new());
-    }
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
+    let limits: Vec<f64> =
+        sources.all.iter().map(|s| chance_limit(s.sensor.reading_count(), sources.samples())).collect();
     let (commands, loss) = (machine.commands().len(), problem.loss);
-    let mut all: Vec<Suspect> = Vec::new();
+    let (mut outliers, mut all) = (0, Vec::new());
     sources.pass(
         |index, chunk| {
             let (source, evaluator) = (&sources.all[index], &evaluators[index]);
             let sigmas = sigmas(source, machine, found.noise[index]);
             let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
             let mut sweep = evaluator.workspace();
-            let mut own = Vec::new();
+            let (mut beyond, mut own) = (0, Vec::new());
             for k in 0..chunk.len {
                 let q = &chunk.commands[k * commands..(k + 1) * commands];
                 let measured = &chunk.values[k * width..(k + 1) * width];
                 let residuals = evaluator.residuals(q, measured, &mut sweep, None);
                 let e2 = standardised(&residuals[..count], &sigmas);
                 let (_, weight) = loss.at(e2);
-                if weight < 0.5 {
+                beyond += u64::from(e2 > limits[index]);
+                if weight < 0.5 || e2 > limits[index] {
                     own.push(Suspect {
                         recording: source.recording.name().into(),
                         line: chunk.lines[k],
@@ -354,15 +358,28 @@ fn suspects(problem: &Problem, found: &Found) -> Result<Vec<Suspect>> {
                     });
                 }
             }
-            own
+            worst_first(&mut own);
+            (beyond, own)
         },
-        |_, own| {
+        |_, (beyond, own)| {
+            outliers += beyond;
             all.extend(own);
-            all.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
-            all.truncate(LISTED);
+            worst_first(&mut all);
         },
     )?;
-    Ok(all)
+    Ok((outliers, all))
+}
+
+fn worst_first(suspects: &mut Vec<Suspect>) {
+    suspects.sort_by(|a, b| b.deviations.total_cmp(&a.deviations));
+    suspects.truncate(LISTED);
+}
+
+/// The mean of squared standardised readings of a sample that noise alone exceeds in one of a hundred sets of so many samples:
+/// the chi-square quantile at `1 - 0.01 / samples`, per reading.
+fn chance_limit(readings: usize, samples: u64) -> f64 {
+    let Ok(distribution) = ChiSquared::new(readings as f64) else { return f64::INFINITY };
+    distribution.inverse_cdf(1.0 - 0.01 / samples.max(1) as f64) / readings as f64
 }
 
 fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
@@ -434,7 +451,16 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
             names.join(", ")
         ));
     }
-    if fit.down_weighted > 0 {
+    if fit.outliers > 0 {
+        let lie = match fit.outliers {
+            1 => "1 sample lies".to_string(),
+            n => format!("{n} samples lie"),
+        };
+        warnings.push(format!(
+            "{lie} further off than noise explains; {} counted less than half",
+            fit.down_weighted
+        ));
+    } else if fit.down_weighted > 0 {
         warnings.push(match fit.down_weighted {
             1 => "1 sample counts less than half because it lies far off".into(),
             n => format!("{n} samples count less than half because they lie far off"),
