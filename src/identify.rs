@@ -33,6 +33,7 @@ use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
 use source::Sources;
+use thin::Thin;
 use unknowns::{Layout, Role, Unknowns};
 
 /// How to identify.
@@ -100,20 +101,22 @@ pub fn calibrate_with_progress(
         layout: &layout,
         loss: Loss::default(),
         prior: true,
+        frozen: Vec::new(),
         progress,
         // As declared: only what nobody has stated is fitted.
         free: layout.mask(|block| !block.prior),
     };
     progress("finding the set-ups");
     let start = Unknowns::nominal(machine, &sources);
-    let (placed, noise) = place(&problem, start)?;
+    let Placed { solution: placed, noise, thin } = place(&mut problem, start)?;
     let nominal = placed.normal.tallies.clone();
 
     problem.loss = options.loss;
     problem.prior = prior;
     problem.free = vec![true; layout.len];
     let found = settle(&problem, options.solver, placed.unknowns, noise)?;
-    let information = Info::new(&found.solution.normal.matrix, &layout, prior, sources.samples());
+    let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
+    let information = Info::new(&found.solution.normal.matrix, &layout, prior, open);
     let calibrated = calibrated(machine, &sources, &found);
     let fit = fit::report(&problem, &nominal, &found, information, options)?;
     Ok((calibrated, fit))
@@ -133,19 +136,20 @@ pub fn fit_setup(
     let sources = Sources::new(recordings, machine, &|_| {})?;
     enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources);
-    let problem = Problem {
+    let mut problem = Problem {
         machine,
         sources: &sources,
         layout: &layout,
         loss,
         prior: true,
+        frozen: Vec::new(),
         progress: &|_| {},
         free: layout.mask(|block| !matches!(block.role, Role::Dyad(_))),
     };
     let mut start = Unknowns::nominal(machine, &sources);
     start.dh = calibrated.deviations().to_vec();
     start.dh[machine.w_index()] = Twist::zero(0.0);
-    let (placed, noise) = place(&problem, start)?;
+    let Placed { solution: placed, noise, .. } = place(&mut problem, start)?;
     let found = settle(&problem, Solver::LevenbergMarquardt, placed.unknowns, noise)?;
     let mut fitted = calibrated.clone();
     put_setups(&mut fitted, &sources, &found.solution.unknowns);
@@ -217,20 +221,21 @@ pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
     let sources = Sources::new(recordings, machine, &|_| {})?;
     enough_to_start(machine, &sources)?;
     let layout = Layout::new(machine, &sources);
-    let problem = Problem {
+    let mut problem = Problem {
         machine,
         sources: &sources,
         layout: &layout,
         loss: Loss::default(),
         prior: true,
+        frozen: Vec::new(),
         progress: &|_| {},
         free: layout.mask(|block| !block.prior),
     };
-    let (placed, _) = place(&problem, Unknowns::nominal(machine, &sources))?;
+    let Placed { solution: placed, .. } = place(&mut problem, Unknowns::nominal(machine, &sources))?;
     let general = normal::matrix_in_general(machine, &sources, &layout, &placed.unknowns);
     Ok(Reach {
-        rank: Info::new(&placed.normal.matrix, &layout, true, sources.samples()).rank,
-        rank_in_general: Info::new(&general, &layout, true, 0).rank,
+        rank: Info::new(&placed.normal.matrix, &layout, true, Vec::new()).rank,
+        rank_in_general: Info::new(&general, &layout, true, Vec::new()).rank,
         unknowns: layout.len,
         samples: sources.samples(),
         dropped: sources.all.iter().map(|s| s.summary.dropped).sum(),
@@ -253,19 +258,28 @@ impl Found {
     }
 }
 
-/// Set-ups found from nothing and then exactly, the machine held.
-fn place(problem: &Problem, mut start: Unknowns) -> Result<(Solution, Vec<Noise>)> {
+/// Set-ups as found before anything of the machine is identified.
+struct Placed {
+    solution: Solution,
+    noise: Vec<Noise>,
+    thin: Vec<Thin>,
+}
+
+/// Set-ups found from nothing and then exactly, the machine held. What the data leave open of them is frozen, here and in all that
+/// follows: it stays as the machine file has it.
+fn place(problem: &mut Problem, mut start: Unknowns) -> Result<Placed> {
     let (machine, sources) = (problem.machine, problem.sources);
     let thin = thin::thin(machine, sources)?;
     align::align(machine, sources, &thin, &mut start);
     let mut noise = thin::robust_noise(machine, sources, &thin, &start);
+    problem.frozen = problem.open(&start, &noise, &thin, 0.0);
     let mut solution = problem.solve(Solver::LevenbergMarquardt, start, &noise)?;
     let rounds = if problem.free.contains(&true) { 3 } else { 0 };
     for _ in 0..rounds {
         noise = thin::robust_noise(machine, sources, &thin, &solution.unknowns);
         solution = problem.solve(Solver::LevenbergMarquardt, solution.unknowns, &noise)?;
     }
-    Ok((solution, noise))
+    Ok(Placed { solution, noise, thin })
 }
 
 /// Solves, takes the noise from what is left, and solves again until the noise no longer changes.
@@ -299,7 +313,7 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
     let sources = &problem.sources.all;
     let free = problem.layout.mask(|_| true);
     let used = if problem.free == free {
-        Info::new(&normal.matrix, problem.layout, problem.prior, problem.sources.samples()).used
+        Info::new(&normal.matrix, problem.layout, problem.prior, problem.frozen.clone()).used
     } else {
         problem.free.iter().filter(|f| **f).count() as f64
     };

@@ -133,6 +133,9 @@ fn rms(rms: &Rms) -> String {
     parts.join(", ")
 }
 
+/// Share of the data from which a single component is listed.
+const MOSTLY: f64 = 0.7;
+
 /// The result as people read it.
 pub(crate) fn render(fit: &Fit, all: bool) -> String {
     let recordings = count(fit.recordings.len() as u64, "recording", "recordings");
@@ -164,7 +167,7 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         count(fit.steps as u64, "step", "steps"),
         fit.stop
     );
-    let shown: Vec<_> = fit.parameters.iter().filter(|p| all || p.share > 0.5).collect();
+    let shown: Vec<_> = fit.parameters.iter().filter(|p| all || p.share > MOSTLY).collect();
     if !shown.is_empty() {
         let heading = if all { "deviations" } else { "deviations that come mostly from the data" };
         let _ = writeln!(text, "\n{heading} (value ± standard error, share of the data)");

@@ -184,7 +184,7 @@ pub(super) fn report(
             let angle = source.quantity(machine, 0) == Quantity::Angle;
             let pick = |noise: &super::Noise| if angle { noise.angle } else { noise.length };
             RecordingFit {
-                name: source.recording.name().to_string(),
+                name: source.label.clone(),
                 setup: sources.setups[source.setup].clone(),
                 measurement: source.sensor.name().into(),
                 samples: source.summary.samples,
@@ -198,7 +198,7 @@ pub(super) fn report(
         .collect();
     let readings = sources.readings();
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
-    let rank_in_general = Information::new(&general, layout, problem.prior, 0).rank;
+    let rank_in_general = Information::new(&general, layout, problem.prior, Vec::new()).rank;
     let (outliers, suspects) = suspects(problem, found)?;
     let fit = Fit {
         machine: machine.name().into(),
@@ -350,7 +350,7 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
                 beyond += u64::from(e2 > limits[index]);
                 if weight < 0.5 || e2 > limits[index] {
                     own.push(Suspect {
-                        recording: source.recording.name().into(),
+                        recording: source.label.clone(),
                         line: chunk.lines[k],
                         residual: residuals[..count.min(3)].iter().map(|r| r * r).sum::<f64>().sqrt(),
                         deviations: e2.sqrt(),
@@ -387,7 +387,7 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     let mut warnings: Vec<String> = Vec::new();
     for source in &sources.all {
         for warning in &source.summary.warnings {
-            warnings.push(format!("{}: {warning}", source.recording.name()));
+            warnings.push(format!("{}: {warning}", source.label));
         }
     }
     if clocks_overlap(problem) {

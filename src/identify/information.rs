@@ -2,13 +2,15 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::unknowns::{Layout, Role};
+use super::unknowns::Layout;
 
 /// Eigenvalues of the scaled information below this part of the largest are rounding: not seen.
 pub(crate) const SEEN: f64 = 1e-12;
 /// An unknown without prior whose information is below this, in units of its tolerance, is open: its standard error exceeds thirty
-/// tolerances. Two socket points, say, see the turn about their line only through the noise of the points.
-const OPEN: f64 = 1e-3;
+/// tolerances.
+pub(crate) const OPEN: f64 = 1e-3;
+/// Below this part of the largest, information about a set-up is exactly none.
+const EXACT: f64 = 1e-9;
 
 /// The information of the data in coordinates scaled by the tolerances, and what follows from it together with the prior.
 #[derive(Clone, Debug)]
@@ -36,8 +38,8 @@ impl Information {
         self.strength[i] / (1.0 + self.strength[i])
     }
 
-    /// From the data's matrix in m and rad over so many samples; `prior` says whether the blocks' priors count.
-    pub(crate) fn new(matrix: &DMatrix<f64>, layout: &Layout, prior: bool, samples: u64) -> Self {
+    /// From the data's matrix in m and rad; `prior` says whether the blocks' priors count, `open` what the data leave open.
+    pub(crate) fn new(matrix: &DMatrix<f64>, layout: &Layout, prior: bool, open: Vec<DVector<f64>>) -> Self {
         let scales = layout.scales();
         let scaled = DMatrix::from_fn(layout.len, layout.len, |a, b| matrix[(a, b)] * scales[a] * scales[b]);
         let has_prior = layout.mask(|b| b.prior);
@@ -66,7 +68,6 @@ impl Information {
         let directions = DMatrix::from_fn(order.len(), order.len(), |a, i| eigen.eigenvectors[(a, order[i])]);
 
         // (28): posterior covariance, infinite along what neither data nor prior hold.
-        let open = open_directions(&outer, &rest, &least(layout, samples, largest));
         let mut full = scaled;
         if prior {
             positions.iter().for_each(|i| full[(*i, *i)] += 1.0);
@@ -103,33 +104,26 @@ fn pseudo_inverse(matrix: &DMatrix<f64>, largest: f64) -> DMatrix<f64> {
     &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
 }
 
-/// The least information that counts for each unknown. About an axis that its points do not leave, a frame seems to be seen through
-/// the noise of the points themselves: as much as one square radian per two readings. Ten times that is asked for.
-fn least(layout: &Layout, samples: u64, largest: f64) -> DVector<f64> {
-    let mut least = DVector::from_element(layout.len, OPEN.max(2e-15 * largest));
-    for block in layout.blocks.iter().filter(|b| matches!(b.role, Role::Setup(_))) {
-        for k in 3..6 {
-            let through_noise = 20.0 * samples as f64 * block.scale[k].powi(2);
-            least[block.offset + k] = least[block.offset + k].max(through_noise);
-        }
-    }
-    least
-}
-
-/// Directions among the unknowns without prior that the data would not show even on a machine without any deviation: their
-/// information is below the `least` that counts.
-fn open_directions(outer: &DMatrix<f64>, rest: &[usize], least: &DVector<f64>) -> Vec<DVector<f64>> {
+/// Directions among the unknowns without prior that the data would not show even on a machine without any deviation: unit vectors
+/// over the scaled parameter vector. `geometry` is the data's matrix with measured points in place of modelled ones.
+pub(crate) fn open_directions(geometry: &DMatrix<f64>, layout: &Layout, least: f64) -> Vec<DVector<f64>> {
+    let scales = layout.scales();
+    let has_prior = layout.mask(|b| b.prior);
+    let rest: Vec<usize> = (0..layout.len).filter(|i| !has_prior[*i]).collect();
     if rest.is_empty() {
         return Vec::new();
     }
-    let eigen = SymmetricEigen::new(outer.clone());
+    let eigen = SymmetricEigen::new(DMatrix::from_fn(rest.len(), rest.len(), |a, b| {
+        geometry[(rest[a], rest[b])] * scales[rest[a]] * scales[rest[b]]
+    }));
+    let limit = least.max(EXACT * eigen.eigenvalues.amax());
     let directions = eigen.eigenvectors.column_iter().zip(eigen.eigenvalues.iter());
     directions
-        .filter_map(|(direction, value)| {
-            let mut vector = DVector::zeros(least.len());
+        .filter(|(_, value)| **value <= limit)
+        .map(|(direction, _)| {
+            let mut vector = DVector::zeros(layout.len);
             rest.iter().zip(direction.iter()).for_each(|(at, x)| vector[*at] = *x);
-            let limit: f64 = vector.iter().zip(least).map(|(x, least)| x * x * least).sum();
-            (*value <= limit).then_some(vector)
+            vector
         })
         .collect()
 }

@@ -6,11 +6,12 @@ use rand::rngs::StdRng;
 
 use super::loss::Loss;
 use super::source::{Source, Sources};
+use super::thin::Thin;
 use super::unknowns::{Layout, Role, Unknowns};
 use crate::chain::{Chain, Sweep, deviation_jacobian};
 use crate::check::random_command;
 use crate::error::Result;
-use crate::lie::{Mat3, Pose, Twist, Vec3};
+use crate::lie::{Mat3, Pose, Twist, Vec3, Wrench};
 use crate::machine::Machine;
 use crate::recording::Chunk;
 use crate::rms::Rms;
@@ -92,6 +93,17 @@ pub(crate) struct Normal {
 
 /// Samples with a smaller weight say nothing about the noise.
 const COUNTS: f64 = 0.25;
+impl Normal {
+    fn zero(layout: &Layout, sources: usize) -> Self {
+        Normal {
+            matrix: DMatrix::zeros(layout.len, layout.len),
+            gradient: DVector::zeros(layout.len),
+            loss: 0.0,
+            tallies: vec![Tally::default(); sources],
+        }
+    }
+}
+
 /// Extra columns of a source behind the six of each dyad: tool point, zero, length.
 const EXTRAS: usize = 5;
 
@@ -225,12 +237,7 @@ pub(crate) fn accumulate(
             }
         },
     )?;
-    let mut normal = Normal {
-        matrix: DMatrix::zeros(layout.len, layout.len),
-        gradient: DVector::zeros(layout.len),
-        loss: 0.0,
-        tallies: vec![Tally::default(); sources.all.len()],
-    };
+    let mut normal = Normal::zero(layout, sources.all.len());
     for (index, sum) in sums.into_iter().enumerate() {
         let Some(mut sum) = sum else { continue };
         let source = &sources.all[index];
@@ -346,6 +353,46 @@ pub(crate) fn point(values: &[f64]) -> Vec3<f64> {
     Vec3([values[0], values[1], values[2]])
 }
 
+/// What thin samples tell of the set-ups: as the data's matrix, but with frame `w` seen through the measured points. Seen through
+/// the modelled ones, which lie off by every error of the machine, two socket points would seem to show the turn about their line.
+pub(crate) fn set_up_geometry(
+    machine: &Machine,
+    sources: &Sources,
+    layout: &Layout,
+    unknowns: &Unknowns,
+    noise: &[Noise],
+    thin: &[Thin],
+) -> DMatrix<f64> {
+    let width = 6 * machine.dyads().len() + EXTRAS;
+    let w = 6 * machine.w_index();
+    let mut normal = Normal::zero(layout, sources.all.len());
+    let mut rows = vec![0.0; MOST_READINGS * width];
+    for (index, source) in sources.all.iter().enumerate() {
+        let evaluator = Evaluator::new(machine, unknowns, source);
+        let mut sweep = evaluator.workspace();
+        let sigmas = sigmas(source, machine, noise[index]);
+        let own: Vec<&Thin> = thin.iter().filter(|t| t.source == index).collect();
+        let each_stands_for = source.summary.samples as f64 / own.len().max(1) as f64;
+        let mut matrix = DMatrix::zeros(width, width);
+        for sample in own {
+            evaluator.residuals(&sample.q, &sample.values, &mut sweep, Some(&mut rows));
+            for (i, sigma) in sigmas.iter().enumerate() {
+                let row = &mut rows[i * width..(i + 1) * width];
+                if i < 3 && matches!(source.sensor, Sensor::Position | Sensor::Pose) {
+                    let unit = Vec3(std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 }));
+                    let seen = Wrench::at_point(unit, point(&sample.values)).to_array();
+                    row[w..w + 6].iter_mut().zip(seen).for_each(|(x, y)| *x = -y);
+                }
+                let row = nalgebra::DVectorView::from_slice(row, width);
+                matrix.ger(each_stands_for / (sigma * sigma), &row, &row, 1.0);
+            }
+        }
+        let sum = Part { matrix, gradient: DVector::zeros(width), loss: 0.0, tally: Tally::default() };
+        scatter(&mut normal, &sum, machine, layout, source);
+    }
+    normal.matrix
+}
+
 /// The data's matrix on general poses of the same instruments: random commands within limits, everything moving.
 pub(crate) fn matrix_in_general(
     machine: &Machine,
@@ -356,12 +403,7 @@ pub(crate) fn matrix_in_general(
     let width = 6 * machine.dyads().len() + EXTRAS;
     let mut rng = StdRng::seed_from_u64(20_260_104);
     let samples = 2 * layout.len;
-    let mut normal = Normal {
-        matrix: DMatrix::zeros(layout.len, layout.len),
-        gradient: DVector::zeros(layout.len),
-        loss: 0.0,
-        tallies: Vec::new(),
-    };
+    let mut normal = Normal::zero(layout, sources.all.len());
     for source in &sources.all {
         let evaluator = Evaluator::new(machine, unknowns, source);
         let commands = (0..samples * machine.commands().len())

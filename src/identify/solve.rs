@@ -3,9 +3,11 @@
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 use serde::Serialize;
 
+use super::information::open_directions;
 use super::loss::Loss;
-use super::normal::{Noise, Normal, accumulate};
+use super::normal::{Noise, Normal, accumulate, set_up_geometry};
 use super::source::Sources;
+use super::thin::Thin;
 use super::unknowns::{Layout, Unknowns};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
@@ -72,6 +74,8 @@ pub(crate) struct Problem<'a> {
     pub prior: bool,
     /// Which parameters may move.
     pub free: Vec<bool>,
+    /// Directions in the scaled parameter vector along which nothing moves: the data leave them open, and would only fit noise there.
+    pub frozen: Vec<DVector<f64>>,
     /// Told what the solver is at, before every pass over the data.
     pub progress: &'a dyn Fn(&str),
 }
@@ -94,6 +98,12 @@ const UNSEEN: f64 = 1e-14;
 impl Problem<'_> {
     pub fn normal(&self, unknowns: &Unknowns, noise: &[Noise]) -> Result<Normal> {
         accumulate(self.machine, self.sources, self.layout, unknowns, noise, self.loss)
+    }
+
+    /// What the data leave open of the set-ups; `least` is the information that counts.
+    pub fn open(&self, unknowns: &Unknowns, noise: &[Noise], thin: &[Thin], least: f64) -> Vec<DVector<f64>> {
+        let geometry = set_up_geometry(self.machine, self.sources, self.layout, unknowns, noise, thin);
+        open_directions(&geometry, self.layout, least)
     }
 
     /// `½ Σ (total / tolerance)²` over the blocks with a prior.
@@ -134,6 +144,20 @@ impl Problem<'_> {
                 matrix[(a, a)] += 1.0;
                 gradient[a] -= pulls[*i];
             }
+        }
+        for direction in &self.frozen {
+            let along = DVector::from_iterator(free.len(), free.iter().map(|i| direction[*i]));
+            let length2 = along.norm_squared();
+            if length2 < 0.5 {
+                continue; // not among the free parameters
+            }
+            // P A P and P g with P = I - d dᵀ / |d|²: the direction gets an eigenvalue of zero and no step.
+            let pushed = &matrix * &along / length2;
+            let within = along.dot(&pushed) / length2;
+            matrix -= &pushed * along.transpose() + &along * pushed.transpose();
+            matrix += within * &along * along.transpose();
+            let pull = along.dot(&gradient) / length2;
+            gradient -= pull * along;
         }
         (matrix, gradient)
     }

@@ -35,6 +35,8 @@ impl<T> Known<T> {
 #[derive(Debug)]
 pub(crate) struct Source<'a> {
     pub recording: &'a Recording,
+    /// File name; with its folder where another recording bears the same.
+    pub label: String,
     pub summary: Summary,
     pub sensor: Sensor,
     /// Index of the set-up.
@@ -115,7 +117,8 @@ impl<'a> Sources<'a> {
             progress(&format!("reading {}", recording.name()));
             let summary = recording.scan()?;
             samples += summary.samples;
-            sources.add(recording, summary, machine);
+            let namesakes = recordings.iter().filter(|r| r.name() == recording.name()).count();
+            sources.add(recording, label(recording, namesakes > 1), summary, machine);
         }
         if samples <= CACHED_SAMPLES {
             for source in &mut sources.all {
@@ -125,7 +128,7 @@ impl<'a> Sources<'a> {
         Ok(sources)
     }
 
-    fn add(&mut self, recording: &'a Recording, summary: Summary, machine: &Machine) {
+    fn add(&mut self, recording: &'a Recording, label: String, summary: Summary, machine: &Machine) {
         let header = recording.header();
         let sensor = Sensor::of(header);
         let setup = index_of(&mut self.setups, header.setup.clone());
@@ -149,7 +152,17 @@ impl<'a> Sources<'a> {
             ToolPoint::Known(point) => Known::Value(*point),
             ToolPoint::Unknown(name) => Known::Unknown(index_of(&mut self.tool_points, name.clone())),
         };
-        self.all.push(Source { recording, summary, sensor, setup, tool_point, zero, length, cached: None });
+        self.all.push(Source {
+            recording,
+            label,
+            summary,
+            sensor,
+            setup,
+            tool_point,
+            zero,
+            length,
+            cached: None,
+        });
     }
 
     /// Samples in all recordings.
@@ -186,6 +199,15 @@ impl<'a> Sources<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// A recording's file name, with its folder where the name alone does not tell.
+fn label(recording: &Recording, with_folder: bool) -> String {
+    let folder = recording.path().parent().and_then(|p| p.file_name()).filter(|_| with_folder);
+    match folder {
+        Some(folder) => format!("{}/{}", folder.to_string_lossy(), recording.name()),
+        None => recording.name().to_string(),
     }
 }
 
