@@ -6,11 +6,11 @@ use kincal::location::LocationErrors;
 
 use super::output::{angle, length};
 
-/// A short table; empty where location errors do not apply.
+/// A short table, or the reason why location errors do not apply.
 pub(crate) fn render_location_errors(found: &LocationErrors) -> String {
     let mut text = String::new();
-    if found.errors.is_empty() {
-        return text;
+    if let Some(reason) = &found.reason {
+        return format!("\nno location errors: {reason}\n");
     }
     let [x, y, z] = found.reference_t_m.map(length);
     let _ = writeln!(
