@@ -4,6 +4,7 @@ mod calibrate;
 mod check;
 mod demo;
 mod describe;
+mod location;
 mod output;
 mod predict;
 

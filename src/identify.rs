@@ -14,7 +14,7 @@ mod thin;
 mod unknowns;
 
 pub use fit::{BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, SetupFit, Suspect};
-pub use information::Information;
+pub use information::{Functional, Information};
 pub use loss::Loss;
 pub(crate) use normal::Evaluator;
 pub use solve::{Solver, Stop};

@@ -26,6 +26,7 @@
 //! | [`check`] | every Jacobian against forward-mode autodiff |
 //! | [`recording`] | CSV recordings, streamed |
 //! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
+//! | [`location`] | the same geometry as ISO 230-1 location errors |
 //! | [`CalibratedMachine`] | a machine file with its deviations |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
@@ -74,6 +75,7 @@ mod document;
 pub mod error;
 pub mod identify;
 pub mod lie;
+pub mod location;
 pub mod machine;
 pub mod predict;
 pub mod recording;

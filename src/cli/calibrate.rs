@@ -187,6 +187,7 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         "\n{seen} combinations of deviations come mostly from the data, {} mostly from the tolerances",
         fit.combinations.len() - seen
     );
+    text.push_str(&super::location::render_location_errors(&fit.location_errors));
     for suspect in fit.suspects.iter().take(5) {
         let _ = writeln!(
             text,

@@ -5,13 +5,16 @@ use std::path::PathBuf;
 
 use kincal::CalibratedMachine;
 use kincal::describe::{Description, DyadDescription, describe};
+use kincal::identify::reach;
 use kincal::lie::{Twist, Vec3};
 use kincal::machine::JointKind;
+use kincal::recording::Recording;
 use serde_json::{Value, json};
 
 use super::Common;
 use super::output::{
-    Failure, Kind, Outcome, Shown, angle, check_outputs, count, decimals, length, open_machine, table,
+    Failure, Kind, Outcome, Shown, angle, check_outputs, count, decimals, length, open_machine,
+    open_recording, table,
 };
 
 #[derive(clap::Args)]
@@ -19,6 +22,9 @@ pub(crate) struct Args {
     /// Machine file, calibrated or not
     #[arg(value_name = "MACHINE.ron")]
     machine: PathBuf,
+    /// Recordings: how many combinations they see, all together, before anything is identified
+    #[arg(value_name = "REC.csv")]
+    recordings: Vec<PathBuf>,
     /// List every combination that a measurement does not see
     #[arg(long)]
     unseen: bool,
@@ -35,6 +41,22 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if calibrated.samples() > 0 {
         text.push_str(&render_calibration(&calibrated));
         result["calibration"] = calibration(&calibrated);
+    }
+    if !args.recordings.is_empty() {
+        let machine = calibrated.machine();
+        let recordings: Vec<Recording> =
+            (args.recordings.iter()).map(|path| open_recording(path, machine)).collect::<Result<_, _>>()?;
+        let reach = reach(machine, &recordings)?;
+        let _ = writeln!(
+            text,
+            "\nthese recordings ({}) see {} of {} combinations of the unknowns, set-ups included; on general poses the same \
+             instruments would see {}",
+            count(reach.samples, "sample", "samples"),
+            reach.rank,
+            reach.unknowns,
+            reach.rank_in_general
+        );
+        result["recordings"] = serde_json::to_value(&reach).map_err(|e| Failure::Answer(e.to_string()))?;
     }
     args.common.say(&text);
     args.common.write_json(&result)

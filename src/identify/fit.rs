@@ -6,9 +6,13 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
 use super::solve::Problem;
+use super::source::Known;
 use super::unknowns::{Block, Role};
 use super::{Evaluator, Found, Information, Loss, Options, Solver, Stop};
+
 use crate::error::Result;
+use crate::lie::Vec3;
+use crate::location::{LocationErrors, location_errors};
 use crate::machine::Machine;
 use crate::rms::Rms;
 use crate::units::Quantity;
@@ -61,6 +65,8 @@ pub struct Fit {
     pub parameters: Vec<ParameterFit>,
     /// Combinations of deviations, best seen first; `share` 0 means that the data say nothing about it.
     pub combinations: Vec<Combination>,
+    /// The same geometry as ISO 230-1 location errors, `docs/location.md`.
+    pub location_errors: LocationErrors,
     /// What the recordings leave open of the set-ups themselves, in words.
     pub open: Vec<String>,
     /// Set-ups as found.
@@ -219,6 +225,12 @@ pub(super) fn report(
         rank_in_general,
         parameters: parameters(problem, found, &information),
         combinations: combinations(problem, &information),
+        location_errors: location_errors(
+            machine,
+            &found.solution.unknowns.dh,
+            reference(problem),
+            Some(&information),
+        ),
         open: information.open.iter().map(|v| in_words(problem, v)).collect(),
         setups: setups(problem, found),
         down_weighted: tallies.iter().map(|t| t.down_weighted).sum(),
@@ -228,6 +240,15 @@ pub(super) fn report(
         information,
     };
     Ok(Fit { warnings: warnings(problem, &fit), ..fit })
+}
+
+/// The datum for offsets of rotary axes: the tool point, if all recordings have the same known one, else the origin of `t`.
+fn reference(problem: &Problem) -> Vec3<f64> {
+    let mut points = problem.sources.all.iter().filter(|s| s.sees_frames()).map(|s| s.tool_point);
+    match points.next() {
+        Some(Known::Value(point)) if points.all(|other| other == Known::Value(point)) => point,
+        _ => Vec3([0.0; 3]),
+    }
 }
 
 fn setups(problem: &Problem, found: &Found) -> Vec<SetupFit> {

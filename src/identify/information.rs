@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use super::unknowns::Layout;
+use super::unknowns::{Layout, Role};
 
 /// Eigenvalues of the scaled information below this part of the largest are rounding: not seen.
 pub(crate) const SEEN: f64 = 1e-12;
@@ -11,6 +11,8 @@ pub(crate) const SEEN: f64 = 1e-12;
 pub(crate) const OPEN: f64 = 1e-3;
 /// Below this part of the largest, information about a set-up is exactly none.
 const EXACT: f64 = 1e-9;
+/// Part of a function's variance along unseen directions that is taken for rounding.
+const ROUNDING: f64 = 1e-6;
 
 /// The information of the data in coordinates scaled by the tolerances, and what follows from it together with the prior.
 #[derive(Clone, Debug)]
@@ -30,12 +32,84 @@ pub struct Information {
     pub open: Vec<DVector<f64>>,
     /// Sum of the data's shares: how many parameters the fit has used up.
     pub used: f64,
+    /// Whether the tolerances acted as a prior.
+    pub prior: bool,
+    /// Where the deviation of a dyad starts in the parameter vector, machine order; `None` for `w`, which belongs to the set-ups.
+    pub dyads: Vec<Option<usize>>,
+}
+
+/// What is known of a smooth function of the deviations, in its own unit squared. To first order, `docs/model.md` (24), (28).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Functional {
+    /// Variance that the tolerances alone allow.
+    pub prior_variance: f64,
+    /// Variance with the data (and the tolerances, where they act as a prior); infinite where nothing determines it.
+    pub posterior_variance: f64,
+    /// What part of the prior variance lies along combinations that the data do not see at all, 0 to 1.
+    pub unseen: f64,
+}
+
+impl Functional {
+    /// Nothing but the tolerances are known.
+    pub fn prior_only(prior_variance: f64) -> Self {
+        Functional { prior_variance, posterior_variance: prior_variance, unseen: 1.0 }
+    }
+
+    /// Share that comes from the data, `1 - posterior variance / prior variance`, 0 to 1.
+    pub fn share(&self) -> f64 {
+        if self.prior_variance > 0.0 {
+            (1.0 - self.posterior_variance / self.prior_variance).clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    }
 }
 
 impl Information {
     /// Share of combination `i` that comes from the data, `1 - posterior variance / prior variance`.
     pub fn share(&self, i: usize) -> f64 {
         self.strength[i] / (1.0 + self.strength[i])
+    }
+
+    /// What is known of a function of the unknowns that have a prior. `gradient_scaled`: its derivatives over the whole parameter
+    /// vector at the estimate, each times its unknown's tolerance; what belongs to a set-up without prior is not looked at.
+    ///
+    /// # Panics
+    /// If the gradient is shorter than the parameter vector.
+    pub fn of_functional(&self, gradient_scaled: &[f64]) -> Functional {
+        let inner = DVector::from_iterator(
+            self.positions.len(),
+            self.positions.iter().map(|at| gradient_scaled[*at]),
+        );
+        let prior_variance = inner.norm_squared();
+        let (mut posterior_variance, mut unseen) = (0.0, 0.0);
+        for (direction, strength) in self.directions.column_iter().zip(self.strength.iter()) {
+            let square = direction.dot(&inner).powi(2);
+            if *strength == 0.0 {
+                unseen += square;
+            }
+            if self.prior {
+                posterior_variance += square / (1.0 + strength);
+            } else if *strength > 0.0 {
+                posterior_variance += square / strength;
+            }
+        }
+        let unseen = if prior_variance > 0.0 { unseen / prior_variance } else { 0.0 };
+        if !self.prior && unseen > ROUNDING {
+            posterior_variance = f64::INFINITY;
+        }
+        Functional { prior_variance, posterior_variance, unseen }
+    }
+
+    /// As [`Information::of_functional`], with six derivatives per dyad in machine order, for a function that does not depend on `w`.
+    pub fn of_deviations(&self, by_dyad_scaled: &[f64]) -> Functional {
+        let mut gradient = vec![0.0; self.variance.len()];
+        for (own, at) in by_dyad_scaled.chunks_exact(6).zip(&self.dyads) {
+            if let Some(at) = at {
+                gradient[*at..*at + 6].copy_from_slice(own);
+            }
+        }
+        self.of_functional(&gradient)
     }
 
     /// From the data's matrix in m and rad; `prior` says whether the blocks' priors count, `open` what the data leave open.
@@ -90,7 +164,9 @@ impl Information {
             strength.iter().map(|s| if prior { s / (1.0 + s) } else { f64::from(*s > 0.0) }).sum::<f64>()
                 + (rest.len() as f64);
         let used = used - open.len() as f64;
-        Information { rank, directions, strength, positions, variance, open, used }
+        let dyads =
+            (0..layout.dyad_count()).map(|j| layout.block(Role::Dyad(j)).map(|block| block.offset)).collect();
+        Information { rank, directions, strength, positions, variance, open, used, prior, dyads }
     }
 }
 

@@ -88,6 +88,13 @@ impl Layout {
         self.blocks.iter().find(|b| b.role == role)
     }
 
+    /// Number of dyads up to the last that has a block of its own (that of the tool frame).
+    pub fn dyad_count(&self) -> usize {
+        let own =
+            self.blocks.iter().filter_map(|b| if let Role::Dyad(j) = b.role { Some(j + 1) } else { None });
+        own.max().unwrap_or(0)
+    }
+
     /// The scales of all parameters, in order.
     pub fn scales(&self) -> DVector<f64> {
         let scales = self.blocks.iter().flat_map(|b| b.scale[..b.len].iter().copied());
