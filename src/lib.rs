@@ -25,6 +25,7 @@
 //! | [`sensor`] | what instruments read, and how that depends on every unknown |
 //! | [`check`] | every Jacobian against forward-mode autodiff |
 //! | [`recording`] | CSV recordings, streamed |
+//! | [`nc`] | NC programs: blocks, words, modal state; written back byte for byte |
 //! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
 //! | [`CalibratedMachine`] | a machine file with its deviations |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
@@ -75,6 +76,7 @@ pub mod error;
 pub mod identify;
 pub mod lie;
 pub mod machine;
+pub mod nc;
 pub mod predict;
 pub mod recording;
 mod rms;
