@@ -107,8 +107,10 @@ impl Block {
     pub fn replace(&mut self, word: usize, text: &str) -> Result<()> {
         let found = self.word(word)?;
         if found.value == Value::Expression {
-            let fault =
-                NcFault::Expression { address: found.address.clone(), text: short(&self.text(&found.value_span)) };
+            let fault = NcFault::Expression {
+                address: found.address.clone(),
+                text: short(&self.text(&found.value_span)),
+            };
             return Err(self.fault(found.value_span.start, fault));
         }
         let span = found.value_span.clone();
@@ -190,7 +192,8 @@ impl Block {
     }
 
     fn edit(&mut self, range: Range<usize>, text: String) {
-        let at = self.edits.partition_point(|(other, _)| (other.start, other.end) <= (range.start, range.end));
+        let at =
+            self.edits.partition_point(|(other, _)| (other.start, other.end) <= (range.start, range.end));
         self.edits.insert(at, (range, text));
     }
 }

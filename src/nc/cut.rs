@@ -35,7 +35,8 @@ fn starts_number(b: u8) -> bool {
 impl Cutter<'_> {
     /// Tokens and words of a line, with or without its line end.
     pub fn cut(bytes: &[u8], dialect: Dialect) -> (Vec<Token>, Vec<Word>) {
-        let mut cutter = Cutter { bytes, dialect, at: 0, tokens: Vec::new(), words: Vec::new(), unbalanced: false };
+        let mut cutter =
+            Cutter { bytes, dialect, at: 0, tokens: Vec::new(), words: Vec::new(), unbalanced: false };
         if bytes.starts_with(b"\xef\xbb\xbf") {
             cutter.at = 3;
         }
@@ -123,7 +124,7 @@ impl Cutter<'_> {
                 self.push(Kind::Other, end);
             }
             b if starts_name(b) => {
-                let letters = self.while_(at, |b| starts_name(b));
+                let letters = self.while_(at, starts_name);
                 if letters == at + 1 && b.is_ascii_alphabetic() { self.address() } else { self.name(letters) }
             }
             b if starts_number(b) => {
@@ -171,7 +172,8 @@ impl Cutter<'_> {
             Some(b'#') => return self.parameter(sign),
             Some(b'[') => return self.balanced(sign),
             Some(b'Q' | b'q') if heidenhain => {
-                let kind = usize::from(matches!(self.byte(sign + 1), Some(b'L' | b'R' | b'S' | b'l' | b'r' | b's')));
+                let kind =
+                    usize::from(matches!(self.byte(sign + 1), Some(b'L' | b'R' | b'S' | b'l' | b'r' | b's')));
                 return sign + 1 + kind + self.digits(sign + 1 + kind);
             }
             Some(b'"') => return self.string(sign),
@@ -245,7 +247,8 @@ impl Cutter<'_> {
         let incremental = name.len() == 2
             && name.starts_with('I')
             && matches!(name.as_bytes()[1], b'A'..=b'C' | b'U'..=b'Z');
-        if !signed && !(incremental && self.byte(letters).is_some_and(|b| starts_number(b) || b == b'Q')) {
+        let valued = self.byte(letters).is_some_and(|b| starts_number(b) || matches!(b, b'Q' | b'q'));
+        if !(signed || incremental && valued) {
             return false;
         }
         let end = self.value_end(letters);
@@ -328,10 +331,10 @@ impl Cutter<'_> {
             let operator = self.blanks(end);
             next = match (self.byte(operator), self.byte(operator + 1)) {
                 (Some(b'='), Some(b'=')) => operator + 2,
-                (Some(b'<' | b'>'), _) => {
-                    self.while_(operator, |b| matches!(b, b'<' | b'>' | b'='))
+                (Some(b'<' | b'>'), _) => self.while_(operator, |b| matches!(b, b'<' | b'>' | b'=')),
+                (Some(b'*'), _) if self.dialect == Dialect::Heidenhain && self.ends(operator + 1) => {
+                    return end;
                 }
-                (Some(b'*'), _) if self.dialect == Dialect::Heidenhain && self.ends(operator + 1) => return end,
                 (Some(b'+' | b'-' | b'*' | b'/' | b'^'), _) => operator + 1,
                 (Some(b), _) if starts_name(b) => {
                     let close = self.while_(operator, of_name);

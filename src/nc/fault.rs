@@ -60,7 +60,9 @@ impl NcFault {
                 format!("write a number behind `{address}`; let the CAM system put variables in as numbers")
             }
             NotPlain { .. } => "write digits with at most one decimal point, no exponent".into(),
-            BadAddress { .. } => "write a letter, or letters with digits behind them, as in `X` or `C1`".into(),
+            BadAddress { .. } => {
+                "write a letter, or letters with digits behind them, as in `X` or `C1`".into()
+            }
         }
     }
 }

@@ -29,8 +29,8 @@ impl Word {
         }
     }
 
-    /// `value` (programmed units) as the writer of this word would have written it, for [`Block::replace`](super::Block::replace):
-    /// only the number, the address and `=` stay where they are. See [`Number::write_like`]; where the source has an
+    /// `value` (programmed units) as the writer of this word would have written it, for
+    /// [`Block::replace`](super::Block::replace): only the number, the address and `=` stay where they are. See [`Number::write_like`]; where the source has an
     /// expression, a signed number with `decimals` digits.
     pub fn write_like(&self, value: f64, decimals: Option<usize>) -> String {
         match self.value {
