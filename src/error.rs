@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::machine::MachineFault;
+use crate::nc::NcFault;
 use crate::recording::RecordingFault;
 
 /// `Result` with this crate's [`Error`].
@@ -65,6 +66,14 @@ pub enum Error {
         /// What is wrong.
         fault: Box<RecordingFault>,
     },
+    /// An NC program that cannot be read or rewritten.
+    #[error("{place}: {fault}")]
+    Nc {
+        /// Where in the program.
+        place: Place,
+        /// What is wrong.
+        fault: Box<NcFault>,
+    },
     /// A text in RON that cannot be read at all.
     #[error("{place}: {message}")]
     Ron {
@@ -99,6 +108,7 @@ impl Error {
         match self {
             Error::Machine { fault, .. } => fault.mend(),
             Error::Recording { fault, .. } => fault.mend(),
+            Error::Nc { fault, .. } => fault.mend(),
             Error::Ron { mend, .. } | Error::Undetermined { mend, .. } => mend.clone(),
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
@@ -110,9 +120,10 @@ impl Error {
     /// Where in a user's file, if it is about one.
     pub fn place(&self) -> Option<&Place> {
         match self {
-            Error::Machine { place, .. } | Error::Recording { place, .. } | Error::Ron { place, .. } => {
-                Some(place)
-            }
+            Error::Machine { place, .. }
+            | Error::Recording { place, .. }
+            | Error::Nc { place, .. }
+            | Error::Ron { place, .. } => Some(place),
             Error::File { .. } | Error::Undetermined { .. } => None,
         }
     }

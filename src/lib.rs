@@ -25,6 +25,7 @@
 //! | [`sensor`] | what instruments read, and how that depends on every unknown |
 //! | [`check`] | every Jacobian against forward-mode autodiff |
 //! | [`recording`] | CSV recordings, streamed |
+//! | [`nc`] | NC programs: blocks, words, modal state; written back byte for byte |
 //! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
 //! | [`location`] | the same geometry as ISO 230-1 location errors |
 //! | [`CalibratedMachine`] | a machine file with its deviations |
@@ -77,6 +78,7 @@ pub mod identify;
 pub mod lie;
 pub mod location;
 pub mod machine;
+pub mod nc;
 pub mod predict;
 pub mod recording;
 mod rms;

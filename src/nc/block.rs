@@ -1,0 +1,207 @@
+//! One block: a line as tokens, and what should be written in its place.
+
+use std::io::Write;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::cut::Cutter;
+use super::number::Number;
+use super::{Dialect, NcFault, Value, Word};
+use crate::error::{Error, Place, Result};
+
+/// A piece of a line. Tokens stand in the order of the line, do not overlap, and only blanks are left between them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Token {
+    /// What it is.
+    pub kind: Kind,
+    /// Its bytes in the line.
+    pub span: Range<usize>,
+}
+
+/// What a token is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// `N10`, `:10`, Heidenhain's bare `10`.
+    BlockNumber,
+    /// `/` or `/3` at the start: the block is left out when the operator wants so.
+    Skip,
+    /// `( ... )`, or `;` to the end of the line.
+    Comment,
+    /// A whole line that starts with `%`.
+    Percent,
+    /// An address with a value: index into [`Block::words`].
+    Word(usize),
+    /// A name with its arguments: `CYCLE800(...)`, `MSG("...")`.
+    Call,
+    /// A name without value: `TRAORI`, Heidenhain's `L`.
+    Name,
+    /// Everything else, passed through: strings, assignments to parameters, what follows `IF` or `DEF`, unknown bytes.
+    Other,
+}
+
+/// One line of a program, its tokens, and the changes that should be written.
+#[derive(Clone, Debug)]
+pub struct Block {
+    file: Arc<Path>,
+    line: usize,
+    bytes: Vec<u8>,
+    tokens: Vec<Token>,
+    words: Vec<Word>,
+    /// Sorted by start; an insertion has an empty range.
+    edits: Vec<(Range<usize>, String)>,
+}
+
+impl Block {
+    /// Reads line `line` (from 1), with or without its line end. Any bytes make a block: what is not understood is
+    /// [`Kind::Other`].
+    pub fn new(line: usize, bytes: &[u8], dialect: Dialect) -> Block {
+        Block::of_file(Arc::from(Path::new("")), line, bytes.to_vec(), dialect)
+    }
+
+    pub(super) fn of_file(file: Arc<Path>, line: usize, bytes: Vec<u8>, dialect: Dialect) -> Block {
+        let (tokens, words) = Cutter::cut(&bytes, dialect);
+        Block { file, line, bytes, tokens, words, edits: Vec::new() }
+    }
+
+    /// Number of the line, from 1.
+    pub fn line(&self) -> usize {
+        self.line
+    }
+
+    /// The line as read, with its line end if it has one.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// The pieces of the line.
+    pub fn tokens(&self) -> &[Token] {
+        &self.tokens
+    }
+
+    /// The words of the line as read; changes do not show here.
+    pub fn words(&self) -> &[Word] {
+        &self.words
+    }
+
+    /// The bytes of a token or word as text, for messages.
+    pub fn text(&self, span: &Range<usize>) -> String {
+        String::from_utf8_lossy(self.bytes.get(span.clone()).unwrap_or_default()).into_owned()
+    }
+
+    /// The name of a [`Kind::Name`] or [`Kind::Call`] in upper case, without arguments; the whole text of another token.
+    pub fn name(&self, token: &Token) -> String {
+        let text = self.text(&token.span).to_ascii_uppercase();
+        match token.kind {
+            Kind::Call => text.split('(').next().unwrap_or_default().trim_end().to_string(),
+            _ => text,
+        }
+    }
+
+    /// Puts `text` in the place of the number of word `word`. A second call for the same word takes the place of the first.
+    ///
+    /// `text`: a plain number in programmed units, as [`Word::write_like`] makes it.
+    ///
+    /// # Errors
+    /// [`NcFault::NoSuchWord`], [`NcFault::Expression`], [`NcFault::NotPlain`].
+    pub fn replace(&mut self, word: usize, text: &str) -> Result<()> {
+        let found = self.word(word)?;
+        if found.value == Value::Expression {
+            let fault = NcFault::Expression {
+                address: found.address.clone(),
+                text: short(&self.text(&found.value_span)),
+            };
+            return Err(self.fault(found.value_span.start, fault));
+        }
+        let span = found.value_span.clone();
+        self.check_number(span.start, text)?;
+        self.edits.retain(|(range, _)| *range != span);
+        self.edit(span, text.to_string());
+        Ok(())
+    }
+
+    /// Puts a new word behind word `after`, for an axis that the block does not name: with `=` where the address needs it,
+    /// with a blank unless the block writes its words without.
+    ///
+    /// `number`: a plain number in programmed units.
+    ///
+    /// # Errors
+    /// [`NcFault::NoSuchWord`], [`NcFault::BadAddress`], [`NcFault::NotPlain`].
+    pub fn insert(&mut self, after: usize, address: &str, number: &str) -> Result<()> {
+        let end = self.word(after)?.span.end;
+        let letters = address.bytes().take_while(u8::is_ascii_alphabetic).count();
+        if letters == 0 || !address.bytes().all(|b| b.is_ascii_alphanumeric()) {
+            return Err(self.fault(end, NcFault::BadAddress { address: short(address) }));
+        }
+        self.check_number(end, number)?;
+        let packed = self.words.windows(2).any(|w| w[0].span.end == w[1].span.start)
+            && self.words[after].value != Value::Expression;
+        let blank = if packed { "" } else { " " };
+        let equals = if address.len() > 1 { "=" } else { "" };
+        self.edit(end..end, format!("{blank}{address}{equals}{number}"));
+        Ok(())
+    }
+
+    /// Whether anything was replaced or inserted.
+    pub fn is_changed(&self) -> bool {
+        !self.edits.is_empty()
+    }
+
+    /// The line as it should be written, with its line end.
+    pub fn output(&self) -> Vec<u8> {
+        let mut out = Vec::with_capacity(self.bytes.len() + 16);
+        let mut at = 0;
+        for (range, text) in &self.edits {
+            out.extend_from_slice(&self.bytes[at..range.start]);
+            out.extend_from_slice(text.as_bytes());
+            at = range.end;
+        }
+        out.extend_from_slice(&self.bytes[at..]);
+        out
+    }
+
+    /// Writes [`output`](Block::output).
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn write_to(&self, out: &mut impl Write) -> std::io::Result<()> {
+        if self.is_changed() { out.write_all(&self.output()) } else { out.write_all(&self.bytes) }
+    }
+
+    /// A fault at a byte of this line.
+    pub(super) fn fault(&self, byte: usize, fault: NcFault) -> Error {
+        Error::Nc { place: Place::at(&self.file, self.line, self.column(byte)), fault: Box::new(fault) }
+    }
+
+    /// Column in characters, from 1.
+    pub(super) fn column(&self, byte: usize) -> usize {
+        String::from_utf8_lossy(&self.bytes[..byte.min(self.bytes.len())]).chars().count() + 1
+    }
+
+    fn word(&self, index: usize) -> Result<&Word> {
+        self.words
+            .get(index)
+            .ok_or_else(|| self.fault(0, NcFault::NoSuchWord { index, words: self.words.len() }))
+    }
+
+    fn check_number(&self, byte: usize, text: &str) -> Result<()> {
+        match Number::parse(text.as_bytes(), Dialect::Heidenhain) {
+            Some(_) => Ok(()),
+            None => Err(self.fault(byte, NcFault::NotPlain { text: short(text) })),
+        }
+    }
+
+    fn edit(&mut self, range: Range<usize>, text: String) {
+        let at =
+            self.edits.partition_point(|(other, _)| (other.start, other.end) <= (range.start, range.end));
+        self.edits.insert(at, (range, text));
+    }
+}
+
+/// For a message: without control characters, cut short.
+fn short(text: &str) -> String {
+    const LONGEST: usize = 40;
+    let clean = |c: char| if c.is_control() { '\u{fffd}' } else { c };
+    let cut: String = text.chars().take(LONGEST).map(clean).collect();
+    if text.chars().nth(LONGEST).is_some() { cut + "..." } else { cut }
+}

@@ -1,0 +1,100 @@
+//! Numbers as a program writes them: the value, and the habits of who wrote it.
+
+use super::Dialect;
+
+/// Most digits behind the point that are ever written.
+pub(super) const MOST_DECIMALS: usize = 300;
+
+/// A plain number of a program, in programmed units (mm or inch, deg): nothing is converted here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Number {
+    /// The value as programmed, finite.
+    pub value: f64,
+    /// Digits behind the decimal point.
+    pub decimals: usize,
+    /// Digits before the decimal point; 0 in `.5`.
+    pub whole: usize,
+    /// Whether it has a decimal point (or, in Heidenhain programs, a decimal comma). Some controls take a number without one
+    /// for a count of least increments.
+    pub has_point: bool,
+    /// Whether zeros pad it to `whole` digits, as in `007`.
+    padded: bool,
+    /// Whether a number that is not negative bears a `+`.
+    plus: bool,
+    comma: bool,
+}
+
+impl Number {
+    /// The number that `text` is, all of it: a sign, digits, at most one decimal point, no exponent.
+    pub fn parse(text: &[u8], dialect: Dialect) -> Option<Number> {
+        let (number, end) = Number::at_start(text, dialect)?;
+        (end == text.len()).then_some(number)
+    }
+
+    /// The number that `text` starts with, and how many bytes it has.
+    pub(super) fn at_start(text: &[u8], dialect: Dialect) -> Option<(Number, usize)> {
+        let heidenhain = dialect == Dialect::Heidenhain;
+        let sign = text.first().filter(|b| matches!(b, b'+' | b'-')).copied();
+        let digits = |from: usize| text[from..].iter().take_while(|b| b.is_ascii_digit()).count();
+        let start = usize::from(sign.is_some());
+        let whole = digits(start);
+        let mut end = start + whole;
+        let (mut decimals, mut has_point, mut comma) = (0, false, false);
+        let point = text.get(end).copied();
+        if point == Some(b'.') || (heidenhain && point == Some(b',')) {
+            let behind = digits(end + 1);
+            if whole + behind > 0 {
+                (decimals, has_point, comma) = (behind, true, point == Some(b','));
+                end += 1 + behind;
+            }
+        }
+        if whole + decimals == 0 {
+            return None;
+        }
+        let plain = String::from_utf8_lossy(&text[..end]).replace(',', ".");
+        let value = plain.parse().ok().filter(|v: &f64| v.is_finite())?;
+        let padded = whole > 1 && text[start] == b'0';
+        let plus = sign == Some(b'+') || (heidenhain && sign == Some(b'-'));
+        Some((Number { value, decimals, whole, has_point, padded, plus, comma }, end))
+    }
+
+    /// `value` as the writer of this number would have written it.
+    ///
+    /// It has `decimals` digits behind the point where that is more than this number has; of these, zeros at the end that go
+    /// beyond the source's digits are left out. Kept are `+`, the point of `3.`, `.5` against `0.5`, leading zeros.
+    /// Never an exponent, never a negative zero. A value without decimals gets no point that the source does not have.
+    /// `value`: programmed units, finite (of another one comes a text that [`Block::replace`](super::Block::replace) refuses).
+    pub fn write_like(&self, value: f64, decimals: Option<usize>) -> String {
+        let places = self.decimals.max(decimals.unwrap_or(0)).min(MOST_DECIMALS);
+        let mut digits = format!("{:.*}", places, value.abs());
+        if !value.is_finite() {
+            return digits;
+        }
+        if let Some(point) = digits.find('.') {
+            let shortest = point + 1 + self.decimals;
+            while digits.len() > shortest && digits.ends_with('0') {
+                digits.pop();
+            }
+            if digits.ends_with('.') && !self.has_point {
+                digits.pop();
+            }
+        } else if self.has_point {
+            digits.push('.');
+        }
+        let is_zero = digits.bytes().all(|b| matches!(b, b'0' | b'.'));
+        if self.whole == 0 && digits.len() > 2 && digits.starts_with("0.") {
+            digits.remove(0);
+        } else if self.padded {
+            let whole = digits.find('.').unwrap_or(digits.len());
+            digits.insert_str(0, &"0".repeat(self.whole.saturating_sub(whole)));
+        }
+        if self.comma {
+            digits = digits.replace('.', ",");
+        }
+        match (value < 0.0 && !is_zero, self.plus) {
+            (true, _) => format!("-{digits}"),
+            (false, true) => format!("+{digits}"),
+            (false, false) => digits,
+        }
+    }
+}
