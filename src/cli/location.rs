@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use kincal::location::LocationErrors;
 
-use super::output::{angle, length};
+use super::output::{Kind, length, table};
 
 /// A short table, or the reason why location errors do not apply.
 pub(crate) fn render_location_errors(found: &LocationErrors) -> String {
@@ -12,25 +12,25 @@ pub(crate) fn render_location_errors(found: &LocationErrors) -> String {
     if let Some(reason) = &found.reason {
         return format!("\nno location errors: {reason}\n");
     }
-    let [x, y, z] = found.reference_t_m.map(length);
+    let seen_from = match found.reference_t_m {
+        [0.0, 0.0, 0.0] => "the origin of t".to_string(),
+        point => format!("({}) in t", point.map(length).join(", ")),
+    };
     let _ = writeln!(
         text,
-        "\nlocation errors, ISO 230-1 (value ± standard error, share of the data; primary axis {}, secondary {}; offsets seen from ({x}, {y}, {z}) in t)",
+        "\nlocation errors, ISO 230-1 (primary axis {}, secondary {}; offsets seen from {seen_from})",
         found.primary.as_deref().unwrap_or("-"),
         found.secondary.as_deref().unwrap_or("-")
     );
-    for error in &found.errors {
-        let show = if error.unit == "m" { length } else { angle };
-        let spread = if error.std_error.is_finite() { show(error.std_error) } else { "unknown".into() };
-        let _ = writeln!(
-            text,
-            "  {:<16}{:>17} ± {:<12} {:>4.0} %  {}",
-            error.name,
-            show(error.value),
-            spread,
-            100.0 * error.share,
-            if error.identified { "identified" } else { "not identified" }
-        );
-    }
+    let rows: Vec<Vec<String>> = (found.errors.iter())
+        .map(|error| {
+            let kind = if error.unit == "m" { Kind::Length } else { Kind::Angle };
+            let (value, spread, unit) = kind.show_with_error(error.value, error.std_error);
+            let verdict = if error.identified { "identified" } else { "not identified" };
+            let share = format!("{:.0} %", 100.0 * error.share);
+            vec![error.name.clone(), value, format!("± {spread} {unit}"), share, verdict.into()]
+        })
+        .collect();
+    text.push_str(&table("  ", &[false, true, false, true, false], &rows));
     text
 }
