@@ -95,17 +95,9 @@ pub fn calibrate_with_progress(
         });
     }
     let prior = options.prior && options.solver.uses_prior();
-    let mut problem = Problem {
-        machine,
-        sources: &sources,
-        layout: &layout,
-        loss: Loss::default(),
-        prior: true,
-        frozen: Vec::new(),
-        progress,
-        // As declared: only what nobody has stated is fitted.
-        free: layout.mask(|block| !block.prior),
-    };
+    // As declared: only what nobody has stated is fitted.
+    let mut problem = Problem::new(machine, &sources, &layout, |block| !block.prior);
+    problem.progress = progress;
     progress("finding the set-ups");
     let start = Unknowns::nominal(machine, &sources);
     let Placed { solution: placed, noise, thin } = place(&mut problem, start)?;
@@ -136,16 +128,8 @@ pub fn fit_setup(
     let sources = Sources::new(recordings, machine, &|_| {})?;
     enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources);
-    let mut problem = Problem {
-        machine,
-        sources: &sources,
-        layout: &layout,
-        loss,
-        prior: true,
-        frozen: Vec::new(),
-        progress: &|_| {},
-        free: layout.mask(|block| !matches!(block.role, Role::Dyad(_))),
-    };
+    let mut problem = Problem::new(machine, &sources, &layout, |block| !matches!(block.role, Role::Dyad(_)));
+    problem.loss = loss;
     let mut start = Unknowns::nominal(machine, &sources);
     start.dh = calibrated.deviations().to_vec();
     start.dh[machine.w_index()] = Twist::zero(0.0);
@@ -221,16 +205,7 @@ pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
     let sources = Sources::new(recordings, machine, &|_| {})?;
     enough_to_start(machine, &sources)?;
     let layout = Layout::new(machine, &sources);
-    let mut problem = Problem {
-        machine,
-        sources: &sources,
-        layout: &layout,
-        loss: Loss::default(),
-        prior: true,
-        frozen: Vec::new(),
-        progress: &|_| {},
-        free: layout.mask(|block| !block.prior),
-    };
+    let mut problem = Problem::new(machine, &sources, &layout, |block| !block.prior);
     let Placed { solution: placed, .. } = place(&mut problem, Unknowns::nominal(machine, &sources))?;
     let general = normal::matrix_in_general(machine, &sources, &layout, &placed.unknowns);
     Ok(Reach {

@@ -8,7 +8,7 @@ use super::loss::Loss;
 use super::normal::{Noise, Normal, accumulate, set_up_geometry};
 use super::source::Sources;
 use super::thin::Thin;
-use super::unknowns::{Layout, Unknowns};
+use super::unknowns::{Block, Layout, Unknowns};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 
@@ -95,7 +95,26 @@ const SETTLED: f64 = 1e-13;
 /// Eigenvalues below this part of the largest are not seen by the data.
 const UNSEEN: f64 = 1e-14;
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    /// With the default loss and the prior; `free` says which blocks may move.
+    pub fn new(
+        machine: &'a Machine,
+        sources: &'a Sources<'a>,
+        layout: &'a Layout,
+        free: impl Fn(&Block) -> bool,
+    ) -> Self {
+        Problem {
+            machine,
+            sources,
+            layout,
+            loss: Loss::default(),
+            prior: true,
+            free: layout.mask(free),
+            frozen: Vec::new(),
+            progress: &|_| {},
+        }
+    }
+
     pub fn normal(&self, unknowns: &Unknowns, noise: &[Noise]) -> Result<Normal> {
         accumulate(self.machine, self.sources, self.layout, unknowns, noise, self.loss)
     }
@@ -145,12 +164,14 @@ impl Problem<'_> {
                 gradient[a] -= pulls[*i];
             }
         }
+        let tolerances = self.layout.scales();
         for direction in &self.frozen {
-            let along = DVector::from_iterator(free.len(), free.iter().map(|i| direction[*i]));
-            let length2 = along.norm_squared();
-            if length2 < 0.5 {
+            if free.iter().map(|i| direction[*i].powi(2)).sum::<f64>() < 0.5 {
                 continue; // not among the free parameters
             }
+            let own = free.iter().map(|i| direction[*i] * tolerances[*i] / scales[*i]);
+            let along = DVector::from_iterator(free.len(), own);
+            let length2 = along.norm_squared();
             // P A P and P g with P = I - d dᵀ / |d|²: the direction gets an eigenvalue of zero and no step.
             let pushed = &matrix * &along / length2;
             let within = along.dot(&pushed) / length2;
