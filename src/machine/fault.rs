@@ -126,16 +126,6 @@ pub enum MachineFault {
         /// Name of the frame.
         frame: String,
     },
-    /// A unit that is not one, or of the wrong kind.
-    #[error("unit `{unit}` is no unit of {what}")]
-    Unit {
-        /// As written.
-        unit: String,
-        /// `length` or `angle`.
-        what: String,
-        /// Those that are.
-        known: String,
-    },
     /// NC sign other than 1 and -1, or an address that is not letters and digits.
     #[error("NC word of joint \"{joint}\" has address \"{address}\" and sign {sign}")]
     NcWord {
@@ -198,7 +188,6 @@ impl MachineFault {
             }
             Leader { known, .. } => format!("joints that can lead: {known}"),
             TwoPlacements { .. } => "keep one of the two ways of saying where the frame is".into(),
-            Unit { known, .. } => format!("write one of: {known}"),
             NcWord { .. } => "write address: letters and digits such as \"B\" or \"C1\", sign: 1 or -1".into(),
             NoJoint => "a machine needs a joint: (frame: \"x\", joint: Prismatic(axis: \"x\"))".into(),
             UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
