@@ -13,8 +13,12 @@ use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine, MachineFault, MachineForm, Placement, at_path, in_unit, to_text};
 
 use crate::rms::Rms;
+use crate::variation::Variation;
+use pieces::PiecesForm;
 
-type Triple = (f64, f64, f64);
+mod pieces;
+
+pub(crate) type Triple = (f64, f64, f64);
 
 /// The field `calibration` of a machine file, in the file's units.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -37,14 +41,16 @@ pub(crate) struct CalibrationForm {
     lengths: Vec<LengthForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     seen: Vec<SeenForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pieces: Option<PiecesForm>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename = "deviation", deny_unknown_fields)]
-struct DeviationForm {
-    frame: String,
-    v: Triple,
-    w: Triple,
+pub(crate) struct DeviationForm {
+    pub frame: String,
+    pub v: Triple,
+    pub w: Triple,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -99,6 +105,7 @@ pub struct CalibratedMachine {
     seen: Vec<Option<(f64, f64)>>,
     samples: u64,
     rms: Rms,
+    variation: Variation,
 }
 
 impl CalibratedMachine {
@@ -115,7 +122,19 @@ impl CalibratedMachine {
             seen: vec![None; commands],
             samples: 0,
             rms: Rms::default(),
+            variation: Variation::default(),
         }
+    }
+
+    /// The machine with deviations that also depend on directions of travel or on features.
+    pub(crate) fn with_variation(mut self, variation: Variation) -> Self {
+        self.variation = variation;
+        self
+    }
+
+    /// What the deviations depend on besides being constant.
+    pub fn variation(&self) -> &Variation {
+        &self.variation
     }
 
     /// The machine with these deviations, one per dyad in machine order, m and rad.
@@ -149,6 +168,11 @@ impl CalibratedMachine {
         let mut chain = self.chain();
         chain.set_previous_from_frame(self.machine.w_index(), *previous_from_w);
         Some(chain)
+    }
+
+    /// Frame `w` of a fitted set-up in the frame before it.
+    pub fn setup(&self, name: &str) -> Option<Pose<f64>> {
+        self.setups.iter().find(|(known, _)| known == name).map(|(_, pose)| *pose)
     }
 
     /// Names of the set-ups that were fitted.
@@ -229,35 +253,17 @@ impl CalibratedMachine {
 
     fn fill(&mut self, form: &CalibrationForm) -> std::result::Result<(), (String, MachineFault)> {
         let units = self.machine.units();
-        let place = |path: String, (x, y, z): Triple, unit: crate::units::Unit| {
-            for (i, value) in [x, y, z].into_iter().enumerate() {
-                checked(format!("{path}[{i}]"), value)?;
-            }
-            Ok(Vec3([x, y, z].map(|c| unit.to_si(c))))
-        };
-        for (i, deviation) in form.deviations.iter().enumerate() {
-            let path = format!("calibration.deviations[{i}]");
-            let Some(j) = self.machine.frame_index(&deviation.frame) else {
-                let frames: Vec<&str> = self.machine.dyads().iter().map(|d| d.frame.as_str()).collect();
-                let fault =
-                    MachineFault::UnknownFrame { frame: deviation.frame.clone(), known: frames.join(", ") };
-                return Err((format!("{path}.frame"), fault));
-            };
-            self.deviations[j] = Twist::new(
-                place(format!("{path}.v"), deviation.v, units.length)?,
-                place(format!("{path}.w"), deviation.w, units.angle)?,
-            );
-        }
+        self.deviations = deviations(&self.machine, "calibration.deviations", &form.deviations)?;
         for (i, setup) in form.setups.iter().enumerate() {
             let path = format!("calibration.setups[{i}]");
             let placement = Placement {
-                at: place(format!("{path}.at"), setup.at, units.length)?,
-                rotation: place(format!("{path}.rotation"), setup.rotation, units.angle)?,
+                at: place(&format!("{path}.at"), setup.at, units.length)?,
+                rotation: place(&format!("{path}.rotation"), setup.rotation, units.angle)?,
             };
             self.setups.push((setup.name.clone(), placement.pose()));
         }
         for (i, point) in form.tool_points.iter().enumerate() {
-            let at = place(format!("calibration.tool_points[{i}].at"), point.at, units.length)?;
+            let at = place(&format!("calibration.tool_points[{i}].at"), point.at, units.length)?;
             self.tool_points.push((point.name.clone(), at));
         }
         for (i, zero) in form.zeros.iter().enumerate() {
@@ -276,6 +282,9 @@ impl CalibratedMachine {
             if let Some(c) = self.machine.commands().iter().position(|c| *c == seen.joint) {
                 self.seen[c] = Some((unit.to_si(seen.from), unit.to_si(seen.to)));
             }
+        }
+        if let Some(pieces) = &form.pieces {
+            self.variation = pieces.read(&self.machine)?;
         }
         self.samples = form.samples;
         self.rms = Rms {
@@ -298,13 +307,7 @@ impl CalibratedMachine {
     pub fn to_ron(&self) -> String {
         let units = self.machine.units();
         let mut form = self.machine.to_form();
-        let deviations = (self.machine.dyads().iter().zip(&self.deviations))
-            .map(|(dyad, dh)| DeviationForm {
-                frame: dyad.frame.clone(),
-                v: in_unit(dh.v, units.length),
-                w: in_unit(dh.w, units.angle),
-            })
-            .collect();
+        let deviations = deviation_forms(&self.machine, &self.deviations);
         let place = |(name, pose): &(String, Pose<f64>)| PlaceForm {
             name: name.clone(),
             at: in_unit(pose.translation, units.length),
@@ -338,6 +341,7 @@ impl CalibratedMachine {
                 })
                 .collect(),
             seen: seen.collect(),
+            pieces: PiecesForm::of(&self.machine, &self.variation),
         });
         to_text(&form)
     }
@@ -356,7 +360,54 @@ impl CalibratedMachine {
     }
 }
 
-fn checked(path: String, value: f64) -> std::result::Result<f64, (String, MachineFault)> {
+fn place(
+    path: &str,
+    (x, y, z): Triple,
+    unit: crate::units::Unit,
+) -> std::result::Result<Vec3<f64>, (String, MachineFault)> {
+    for (i, value) in [x, y, z].into_iter().enumerate() {
+        checked(format!("{path}[{i}]"), value)?;
+    }
+    Ok(Vec3([x, y, z].map(|c| unit.to_si(c))))
+}
+
+/// Deviations of every dyad from a list in the file; frames that are not listed have none.
+pub(crate) fn deviations(
+    machine: &Machine,
+    path: &str,
+    forms: &[DeviationForm],
+) -> std::result::Result<Vec<Twist<f64>>, (String, MachineFault)> {
+    let units = machine.units();
+    let mut deviations = vec![Twist::zero(0.0); machine.dyads().len()];
+    for (i, deviation) in forms.iter().enumerate() {
+        let path = format!("{path}[{i}]");
+        let Some(j) = machine.frame_index(&deviation.frame) else {
+            let frames: Vec<&str> = machine.dyads().iter().map(|d| d.frame.as_str()).collect();
+            let fault =
+                MachineFault::UnknownFrame { frame: deviation.frame.clone(), known: frames.join(", ") };
+            return Err((format!("{path}.frame"), fault));
+        };
+        deviations[j] = Twist::new(
+            place(&format!("{path}.v"), deviation.v, units.length)?,
+            place(&format!("{path}.w"), deviation.w, units.angle)?,
+        );
+    }
+    Ok(deviations)
+}
+
+/// The list as it stands in the file.
+pub(crate) fn deviation_forms(machine: &Machine, deviations: &[Twist<f64>]) -> Vec<DeviationForm> {
+    let units = machine.units();
+    (machine.dyads().iter().zip(deviations))
+        .map(|(dyad, dh)| DeviationForm {
+            frame: dyad.frame.clone(),
+            v: in_unit(dh.v, units.length),
+            w: in_unit(dh.w, units.angle),
+        })
+        .collect()
+}
+
+pub(crate) fn checked(path: String, value: f64) -> std::result::Result<f64, (String, MachineFault)> {
     if value.is_finite() && value.abs() < 1e9 {
         return Ok(value);
     }

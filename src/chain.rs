@@ -20,6 +20,8 @@ struct Link<S> {
     /// `M_j exp(dh_j)`.
     previous_from_frame: Pose<S>,
     joint: Option<(JointKind, Vec3<f64>, Drive)>,
+    /// `exp(e_j)`, the error motion of what the joint carries.
+    carried: Option<Pose<S>>,
 }
 
 /// A chain at one vector of commands.
@@ -27,6 +29,8 @@ struct Link<S> {
 pub struct Sweep<S> {
     /// Pose of each dyad's frame in the base, before its joint has moved, machine order.
     b_from_frame: Vec<Pose<S>>,
+    /// The same behind the joint and its carried deviation.
+    b_from_carried: Vec<Pose<S>>,
     b_from_w: Pose<S>,
     b_from_t: Pose<S>,
     workpiece_count: usize,
@@ -53,7 +57,7 @@ impl<S: Scalar> Chain<S> {
                 let drive = machine.drive(j).expect("every joint has a drive").clone();
                 (joint.kind, joint.axis, drive)
             });
-            Link { previous_from_frame: nominal * Pose::exp(*dh), joint }
+            Link { previous_from_frame: nominal * Pose::exp(*dh), joint, carried: None }
         };
         Chain {
             links: deviations.iter().enumerate().map(link).collect(),
@@ -66,6 +70,19 @@ impl<S: Scalar> Chain<S> {
         self.links[j].previous_from_frame = previous_from_frame;
     }
 
+    /// Takes every initial pose, deviations included, from a chain of the same machine; nothing is carried behind the joints.
+    pub fn copy_frames(&mut self, from: &Chain<S>) {
+        for (link, other) in self.links.iter_mut().zip(&from.links) {
+            link.previous_from_frame = other.previous_from_frame;
+            link.carried = None;
+        }
+    }
+
+    /// Puts a deviation behind the joint of dyad `j`: `T = M_j exp(dh_j) exp(xi_j q_j) exp(e_j)`, `docs/model.md` (30).
+    pub fn set_carried(&mut self, j: usize, carried: Pose<S>) {
+        self.links[j].carried = Some(carried);
+    }
+
     /// `M_j exp(dh_j)` of dyad `j`.
     pub fn previous_from_frame(&self, j: usize) -> Pose<S> {
         self.links[j].previous_from_frame
@@ -75,6 +92,7 @@ impl<S: Scalar> Chain<S> {
     pub fn sweep(&self, q: &[S]) -> Sweep<S> {
         let mut sweep = Sweep {
             b_from_frame: Vec::with_capacity(self.links.len()),
+            b_from_carried: Vec::with_capacity(self.links.len()),
             b_from_w: self.links[0].previous_from_frame,
             b_from_t: self.links[0].previous_from_frame,
             workpiece_count: self.workpiece_count,
@@ -86,6 +104,7 @@ impl<S: Scalar> Chain<S> {
     /// As [`Chain::sweep`], into memory that is used again.
     pub fn sweep_into(&self, q: &[S], sweep: &mut Sweep<S>) {
         sweep.b_from_frame.clear();
+        sweep.b_from_carried.clear();
         let like = q[0];
         let mut behind = Pose::identity(like);
         for (j, link) in self.links.iter().enumerate() {
@@ -99,6 +118,10 @@ impl<S: Scalar> Chain<S> {
                 None => b_from_frame,
                 Some((kind, axis, drive)) => b_from_frame * joint_pose(*kind, *axis, displacement(drive, q)),
             };
+            if let Some(carried) = link.carried {
+                behind = behind * carried;
+            }
+            sweep.b_from_carried.push(behind);
         }
         sweep.b_from_t = behind;
     }
@@ -171,6 +194,13 @@ impl<S: Scalar> Sweep<S> {
                 row[6 * j + k] = value.scale(sign);
             }
         }
+    }
+
+    /// The block of a deviation behind the joint of dyad `j`, as [`Sweep::error_row`] gives those before the joint.
+    #[inline]
+    pub fn carried_block(&self, j: usize, y_w: Wrench<S>) -> [S; 6] {
+        let y_b = self.b_from_w.inverse().carry_wrench(y_w);
+        self.b_from_carried[j].carry_wrench(y_b).to_array().map(|x| x.scale(self.sign(j)))
     }
 
     /// The row of a scalar measurement over the commands, `docs/model.md` (13).

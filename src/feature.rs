@@ -14,6 +14,14 @@ pub struct Samples<'a> {
     pub commands: usize,
 }
 
+impl<'a> Samples<'a> {
+    /// Directions of travel of all commands at sample `k`.
+    #[inline]
+    pub fn directions(&self, k: usize) -> &'a [i8] {
+        &self.motion.directions[k * self.commands..(k + 1) * self.commands]
+    }
+}
+
 /// A number for each sample, made of what was commanded and of the path so far.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Feature {

@@ -4,8 +4,10 @@
 //! file's tolerances, so that what the data do not see stays at zero instead of drifting. The result is data: [`Fit`].
 
 mod align;
+mod evaluator;
 mod fit;
 mod information;
+mod judge;
 mod loss;
 mod normal;
 mod solve;
@@ -13,10 +15,14 @@ mod source;
 mod thin;
 mod unknowns;
 
-pub use fit::{BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, SetupFit, Suspect};
+pub(crate) use evaluator::{Evaluator, Moment, Values};
+pub use fit::{
+    BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit,
+    Suspect,
+};
 pub use information::{Functional, Information};
+pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
-pub(crate) use normal::Evaluator;
 pub use solve::{Solver, Stop};
 pub(crate) use source::channel;
 
@@ -29,12 +35,13 @@ use crate::machine::Machine;
 use crate::recording::Recording;
 pub use crate::rms::Rms;
 use crate::units::Quantity;
+use crate::variation::{Variation, Varying};
 use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
-use source::Sources;
+use source::{History, Sources};
 use thin::Thin;
-use unknowns::{Layout, Role, Unknowns};
+use unknowns::{Block, Layout, Role, Unknowns};
 
 /// How to identify.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +60,17 @@ impl Default for Options {
     }
 }
 
+/// What to identify besides constant deviations, and from which samples.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    /// What deviations depend on.
+    pub varying: Varying,
+    /// Dead bands of the directions of travel by command, m or rad; where there is none, 1e-5 of the command's range.
+    pub dead_bands: Vec<Option<f64>>,
+    /// As many samples of each piece are used, evenly spread; the others judge the result.
+    pub samples: Option<u64>,
+}
+
 /// Rounds of re-estimating the noise from the residuals.
 const NOISE_ROUNDS: usize = 12;
 
@@ -65,23 +83,32 @@ pub fn calibrate(
     recordings: &[Recording],
     options: Options,
 ) -> Result<(CalibratedMachine, Fit)> {
-    calibrate_with_progress(machine, recordings, options, &|_| {})
+    calibrate_model(machine, recordings, &Model::default(), options, &|_| {})
 }
 
-/// As [`calibrate`], telling `progress` what it is at.
+/// As [`calibrate`], of a model whose deviations vary, telling `progress` what it is at.
 ///
 /// # Errors
 /// As [`calibrate`].
-pub fn calibrate_with_progress(
+pub fn calibrate_model(
     machine: &Machine,
     recordings: &[Recording],
+    model: &Model,
     options: Options,
     progress: &dyn Fn(&str),
 ) -> Result<(CalibratedMachine, Fit)> {
-    let sources = Sources::new(recordings, machine, progress)?;
+    let varying = &model.varying;
+    let history = History { needed: !varying.is_constant(), dead_bands: model.dead_bands.clone() };
+    let mut sources = Sources::new(recordings, machine, &history, progress)?;
+    if let Some(count) = model.samples {
+        let directions = varying.directions.as_ref();
+        sources.pick(count, directions.map_or(1, |d| d.piece_count()), |samples, k| {
+            directions.map_or(0, |d| d.piece(samples.directions(k)))
+        })?;
+    }
     enough_to_start(machine, &sources)?;
     enough_for_setups(&sources)?;
-    let layout = Layout::new(machine, &sources);
+    let layout = Layout::new(machine, &sources, varying);
     let alone: usize = layout.blocks.iter().filter(|b| !b.prior).map(|b| b.len).sum();
     if sources.readings() <= alone as u64 {
         return Err(Error::Undetermined {
@@ -96,12 +123,13 @@ pub fn calibrate_with_progress(
     }
     let prior = options.prior && options.solver.uses_prior();
     // As declared: only what nobody has stated is fitted.
-    let mut problem = Problem::new(machine, &sources, &layout, |block| !block.prior);
+    let mut problem = Problem::new(machine, &sources, &layout, varying, is_of_setup);
     problem.progress = progress;
     progress("finding the set-ups");
-    let start = Unknowns::nominal(machine, &sources);
+    let start = Unknowns::nominal(machine, &sources, varying);
     let Placed { solution: placed, noise, thin } = place(&mut problem, start)?;
     let nominal = placed.normal.tallies.clone();
+    let declared = placed.unknowns.clone();
 
     problem.loss = options.loss;
     problem.prior = prior;
@@ -109,9 +137,24 @@ pub fn calibrate_with_progress(
     let found = settle(&problem, options.solver, placed.unknowns, noise)?;
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
     let information = Info::new(&found.solution.normal.matrix, &layout, prior, open);
-    let calibrated = calibrated(machine, &sources, &found);
-    let fit = fit::report(&problem, &nominal, &found, information, options)?;
+    let mut calibrated = calibrated(machine, &sources, &found);
+    let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
+    let unknowns = &found.solution.unknowns;
+    if !varying.is_constant() {
+        calibrated = calibrated.with_variation(Variation {
+            varying: varying.clone(),
+            parts: unknowns.parts.clone(),
+            coefficients: unknowns.coefficients.clone(),
+            dead_bands: sources.dead_bands.clone(),
+            samples: fit.piece_samples.clone(),
+        });
+    }
     Ok((calibrated, fit))
+}
+
+/// What nobody has stated: frames, tool points, zeros and lengths of the set-ups.
+fn is_of_setup(block: &Block) -> bool {
+    !block.prior && !matches!(block.role, Role::Term(_))
 }
 
 /// Finds again only what belongs to the set-up of `recordings`: frame `w`, unknown tool points, zeros and lengths. The machine
@@ -124,14 +167,20 @@ pub fn fit_setup(
     recordings: &[Recording],
     loss: Loss,
 ) -> Result<CalibratedMachine> {
-    let machine = calibrated.machine();
-    let sources = Sources::new(recordings, machine, &|_| {})?;
+    let (machine, variation) = (calibrated.machine(), calibrated.variation());
+    let varying = &variation.varying;
+    let dead_bands = variation.dead_bands.iter().map(|band| Some(*band)).collect();
+    let history = History { needed: !varying.is_constant(), dead_bands };
+    let sources = Sources::new(recordings, machine, &history, &|_| {})?;
     enough_for_setups(&sources)?;
-    let layout = Layout::new(machine, &sources);
-    let mut problem = Problem::new(machine, &sources, &layout, |block| !matches!(block.role, Role::Dyad(_)));
+    let layout = Layout::new(machine, &sources, varying);
+    let mut problem = Problem::new(machine, &sources, &layout, varying, |block| {
+        !matches!(block.role, Role::Dyad(_) | Role::Part { .. } | Role::Term(_))
+    });
     problem.loss = loss;
-    let mut start = Unknowns::nominal(machine, &sources);
+    let mut start = Unknowns::nominal(machine, &sources, varying);
     start.dh = calibrated.deviations().to_vec();
+    (start.parts, start.coefficients) = (variation.parts.clone(), variation.coefficients.clone());
     start.dh[machine.w_index()] = Twist::zero(0.0);
     let Placed { solution: placed, noise, .. } = place(&mut problem, start)?;
     let found = settle(&problem, Solver::LevenbergMarquardt, placed.unknowns, noise)?;
@@ -202,11 +251,13 @@ pub struct Reach {
 /// # Errors
 /// As [`calibrate`].
 pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
-    let sources = Sources::new(recordings, machine, &|_| {})?;
+    let varying = Varying::default();
+    let sources = Sources::new(recordings, machine, &History::default(), &|_| {})?;
     enough_to_start(machine, &sources)?;
-    let layout = Layout::new(machine, &sources);
-    let mut problem = Problem::new(machine, &sources, &layout, |block| !block.prior);
-    let Placed { solution: placed, .. } = place(&mut problem, Unknowns::nominal(machine, &sources))?;
+    let layout = Layout::new(machine, &sources, &varying);
+    let mut problem = Problem::new(machine, &sources, &layout, &varying, is_of_setup);
+    let Placed { solution: placed, .. } =
+        place(&mut problem, Unknowns::nominal(machine, &sources, &varying))?;
     let general = normal::matrix_in_general(machine, &sources, &layout, &placed.unknowns);
     Ok(Reach {
         rank: Info::new(&placed.normal.matrix, &layout, true, Vec::new()).rank,

@@ -88,6 +88,7 @@ mod scalar;
 pub mod sensor;
 pub mod simulate;
 pub mod units;
+pub mod variation;
 
 pub use calibration::CalibratedMachine;
 pub use chain::{Chain, Sweep};

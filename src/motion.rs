@@ -15,6 +15,22 @@ pub struct Motion {
     pub since_reversal: Vec<f64>,
 }
 
+impl Motion {
+    /// The rows of these samples.
+    pub fn chosen(&self, commands: usize, samples: &[usize]) -> Motion {
+        fn rows<T: Copy>(all: &[T], width: usize, samples: &[usize]) -> Vec<T> {
+            if all.is_empty() {
+                return Vec::new();
+            }
+            samples.iter().flat_map(|k| all[k * width..(k + 1) * width].iter().copied()).collect()
+        }
+        Motion {
+            directions: rows(&self.directions, commands, samples),
+            since_reversal: rows(&self.since_reversal, commands, samples),
+        }
+    }
+}
+
 /// Where one command stands in its history.
 #[derive(Clone, Copy, Debug)]
 struct Axis {

@@ -5,11 +5,12 @@ use std::io::Write;
 use serde::Serialize;
 
 use crate::calibration::CalibratedMachine;
-use crate::chain::Chain;
 use crate::error::{Error, Result};
-use crate::identify::{Evaluator, channel};
+use crate::feature::Samples;
+use crate::identify::{Evaluator, Moment, Values, channel};
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
+use crate::motion::{FirstDirections, Motion, Tracker};
 use crate::recording::{Header, NominalLength, Recording, Role, ToolPoint};
 use crate::sensor::{Sensor, SensorState};
 use crate::units::Unit;
@@ -41,6 +42,9 @@ pub struct Prediction {
     pub mean_rad: Option<f64>,
     /// Samples at which a joint leaves the range that the calibration has seen.
     pub extrapolated_samples: u64,
+    /// Samples with a pattern of directions of travel that the calibration has not seen; they are predicted from what single
+    /// directions have shown.
+    pub unseen_directions: u64,
 }
 
 /// Sums over residual norms of one kind.
@@ -85,31 +89,38 @@ pub fn predict(
     let header = recording.header();
     let sensor = Sensor::of(header);
     let state = sensor_state(calibrated, header, &sensor)?;
-    let evaluator = Evaluator {
-        machine,
-        chain: chain(calibrated, header, &sensor)?,
-        state,
-        sensor: &sensor,
-        dh: calibrated.deviations(),
+    let (previous_from_w, dh) = frame_of_w(calibrated, header, &sensor)?;
+    let variation = calibrated.variation();
+    let values = Values {
+        directions: variation.varying.directions.as_ref(),
+        parts: &variation.parts,
+        terms: &variation.varying.terms,
+        coefficients: &variation.coefficients,
     };
+    let evaluator = Evaluator::with(machine, &sensor, state, previous_from_w, &dh, values);
+    let mut tracker = tracker(calibrated, recording)?;
     let columns = measured_columns(recording);
     let failed = |e| Error::file(recording.path(), e);
     if let Some(out) = &mut out {
         write_head(*out, recording, &columns).map_err(failed)?;
     }
-    let mut sweep = evaluator.workspace();
+    let mut work = evaluator.workspace();
     let (mut lengths, mut angles) = (Sums::default(), Sums::default());
-    let (mut dropped, mut extrapolated) = (0, 0);
+    let (mut dropped, mut extrapolated, mut unseen) = (0, 0, 0);
     let (commands, values) = (machine.commands().len(), recording.value_count());
     for block in recording.rows_with_text()? {
         let block = block?;
+        let motion = tracker.as_mut().map_or_else(Motion::default, |t| t.follow(&block.chunk));
+        let samples = Samples { chunk: &block.chunk, motion: &motion, commands };
         for row in block.rows() {
             let mut tail = ",".repeat(2 * columns.len());
             if let Some(k) = row.sample {
                 let q = &block.chunk.commands[k * commands..(k + 1) * commands];
                 let measured = &block.chunk.values[k * values..(k + 1) * values];
                 extrapolated += u64::from(calibrated.extrapolates(q));
-                let residuals = evaluator.residuals(q, measured, &mut sweep, None);
+                let moment = if tracker.is_some() { Moment::At(&samples, k) } else { Moment::Still };
+                unseen += u64::from(!variation.has_seen(evaluator.piece(moment)));
+                let residuals = evaluator.residuals(q, measured, moment, &mut work, None);
                 let residuals = &residuals[..sensor.reading_count()];
                 match &sensor {
                     Sensor::Pose => {
@@ -142,6 +153,7 @@ pub fn predict(
         max_rad,
         mean_rad,
         extrapolated_samples: extrapolated,
+        unseen_directions: unseen,
     })
 }
 
@@ -149,10 +161,34 @@ fn is_revolute(machine: &Machine, dyad: usize) -> bool {
     machine.dyads()[dyad].joint.as_ref().is_some_and(|j| j.kind == JointKind::Revolute)
 }
 
-/// The chain of the recording's set-up.
-fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Result<Chain<f64>> {
-    match calibrated.chain_of_setup(&header.setup) {
-        Some(chain) => Ok(chain),
+/// Follows the path where the model depends on its history.
+fn tracker(calibrated: &CalibratedMachine, recording: &Recording) -> Result<Option<Tracker>> {
+    let variation = calibrated.variation();
+    if variation.varying.is_constant() {
+        return Ok(None);
+    }
+    let mut first = FirstDirections::new(variation.dead_bands.clone());
+    for chunk in recording.chunks()? {
+        if first.look(&chunk?) {
+            break;
+        }
+    }
+    Ok(Some(Tracker::new(variation.dead_bands.clone(), first.found())))
+}
+
+/// Frame `w` of the recording's set-up in the frame before it, and the deviations that go with it.
+fn frame_of_w(
+    calibrated: &CalibratedMachine,
+    header: &Header,
+    sensor: &Sensor,
+) -> Result<(Pose<f64>, Vec<Twist<f64>>)> {
+    let machine = calibrated.machine();
+    let mut dh = calibrated.deviations().to_vec();
+    match calibrated.setup(&header.setup) {
+        Some(frame) => {
+            dh[machine.w_index()] = Twist::zero(0.0);
+            Ok((frame, dh))
+        }
         None if header.workpiece_frame_unknown && !matches!(sensor, Sensor::Joint { .. }) => {
             let known: Vec<&str> = calibrated.setup_names().collect();
             let setup = match header.setup.as_str() {
@@ -164,7 +200,7 @@ fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Re
                 &known,
             ))
         }
-        None => Ok(calibrated.chain()),
+        None => Ok((machine.dyads()[machine.w_index()].placement.pose(), dh)),
     }
 }
 

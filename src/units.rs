@@ -130,6 +130,24 @@ impl Unit {
     }
 }
 
+/// A number with its unit behind it, such as `0.01deg` or `100 mm`, in SI; `None` if it is not one of this quantity.
+///
+/// ```
+/// use kincal::units::{Quantity, measure};
+/// assert_eq!(measure("100 mm", Quantity::Length), Some(0.1));
+/// assert_eq!(measure("100mm", Quantity::Angle), None);
+/// ```
+pub fn measure(text: &str, quantity: Quantity) -> Option<f64> {
+    let text = text.trim();
+    let of_quantity = |u: &&Unit| u.quantity == quantity && text.ends_with(u.symbol);
+    // `mm` ends with `m`: the longest symbol that leaves a number counts.
+    let mut numbers = UNITS.iter().filter(of_quantity).filter_map(|u| {
+        let number: f64 = text[..text.len() - u.symbol.len()].trim().parse().ok()?;
+        number.is_finite().then(|| u.to_si(number))
+    });
+    numbers.next_back()
+}
+
 impl fmt::Display for Unit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.symbol)

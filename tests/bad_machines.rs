@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use kincal::{Error, Machine};
+use kincal::{CalibratedMachine, Error, Machine};
 use proptest::prelude::*;
 
 fn folder(name: &str) -> PathBuf {
@@ -18,7 +18,7 @@ fn files(name: &str) -> Vec<PathBuf> {
 
 /// The error of one of the bad machines, its path cut down to the file's name.
 fn error_of(path: &Path) -> Error {
-    Machine::open(path).err().unwrap_or_else(|| panic!("{} can be read", path.display()))
+    CalibratedMachine::open(path).err().unwrap_or_else(|| panic!("{} can be read", path.display()))
 }
 
 /// `line:column` of a message, and what stands there.

@@ -4,13 +4,17 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use kincal::identify::{Fit, Loss, Options, Rms, Solver, calibrate_with_progress};
+use kincal::identify::{Figures, Fit, Loss, Model, Options, Rms, Solver, calibrate_model};
+use kincal::machine::JointKind;
 use kincal::recording::Recording;
+use kincal::units::{Quantity, Unit, measure};
+use kincal::variation::{Directions, MOST_AXES, Varying};
 use kincal::{CalibratedMachine, Machine};
 
 use super::Common;
 use super::output::{
-    Kind, Outcome, angle, check_outputs, count, length, open_machine, open_recording, table, write_whole,
+    Failure, Kind, Outcome, angle, check_outputs, count, length, open_machine, open_recording, table,
+    write_whole,
 };
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -67,6 +71,15 @@ pub(crate) struct Args {
     /// Do not hold deviations near zero by the tolerances of the machine file
     #[arg(long)]
     no_prior: bool,
+    /// A model for each pattern of directions of travel of these axes, such as a,c
+    #[arg(long, value_name = "AXES", value_delimiter = ',')]
+    directions: Vec<String>,
+    /// Motion against the direction of travel that is still no reversal, such as a=0.01deg (1e-5 of the range unless given)
+    #[arg(long, value_name = "AXIS=SIZE", value_delimiter = ',')]
+    dead_band: Vec<String>,
+    /// Use so many samples of each piece of the model, evenly spread, and judge it on the others
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    samples: Option<u64>,
     /// List every component of every deviation, not only those that the data determine
     #[arg(long)]
     all: bool,
@@ -75,6 +88,44 @@ pub(crate) struct Args {
 }
 
 impl Args {
+    /// The model asked for.
+    fn model(&self, machine: &Machine) -> Outcome<Model> {
+        let mut axes = Vec::new();
+        for name in &self.directions {
+            let c = command(machine, name)?;
+            if axes.contains(&c) {
+                let what = format!("--directions names {name} twice");
+                return Err(Failure::Told { what, mend: "name every axis once".into() });
+            }
+            axes.push(c);
+        }
+        if axes.len() > MOST_AXES {
+            let what = format!("--directions names {} axes", axes.len());
+            return Err(Failure::Told { what, mend: format!("name at most {MOST_AXES}") });
+        }
+        let mut dead_bands = vec![None; machine.commands().len()];
+        for text in &self.dead_band {
+            let (name, size) = text.split_once('=').unwrap_or((text, ""));
+            let c = command(machine, name)?;
+            let quantity = match machine.command_joint(c).kind {
+                JointKind::Prismatic => Quantity::Length,
+                JointKind::Revolute => Quantity::Angle,
+            };
+            let Some(band) = measure(size, quantity).filter(|band| *band >= 0.0) else {
+                let what = format!("--dead-band {text} is not an axis with a size");
+                let units = Unit::symbols_of(quantity);
+                let mend = format!(
+                    "write {name}=SIZE with one of the units {units}, such as {name}=0.01{}",
+                    units.split(' ').next_back().unwrap_or("")
+                );
+                return Err(Failure::Told { what, mend });
+            };
+            dead_bands[c] = Some(band);
+        }
+        let directions = (!axes.is_empty()).then(|| Directions::new(axes));
+        Ok(Model { varying: Varying { directions, terms: Vec::new() }, dead_bands, samples: self.samples })
+    }
+
     fn options(&self) -> Options {
         Options {
             solver: match self.solver {
@@ -99,7 +150,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let recordings: Vec<Recording> =
         args.recordings.iter().map(|path| open_recording(path, &machine)).collect::<Result<_, _>>()?;
     let progress = args.common.progress();
-    let found = calibrate_with_progress(&machine, &recordings, args.options(), &|text| progress.say(text));
+    let found = calibrate_model(&machine, &recordings, &args.model(&machine)?, args.options(), &|text| {
+        progress.say(text)
+    });
     drop(progress);
     let (calibrated, fit) = found?;
     let mut text = render(&fit, args.all);
@@ -109,6 +162,13 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     args.common.say(&text);
     args.common.write_json(&fit)
+}
+
+fn command(machine: &Machine, name: &str) -> Outcome<usize> {
+    machine.commands().iter().position(|c| c == name).ok_or_else(|| Failure::Told {
+        what: format!("\"{name}\" is no axis of {}", machine.name()),
+        mend: format!("its axes are {}", machine.commands().join(", ")),
+    })
 }
 
 /// A number above zero.
@@ -131,6 +191,45 @@ pub(crate) fn write_machine(path: &std::path::Path, calibrated: &CalibratedMachi
 fn rms(rms: &Rms) -> String {
     let parts: Vec<String> = rms.m.map(length).into_iter().chain(rms.rad.map(angle)).collect();
     parts.join(", ")
+}
+
+fn figures(figures: &Figures) -> [String; 2] {
+    [rms(&figures.rms), rms(&figures.max)]
+}
+
+/// The pieces of the model, and the samples that were held out.
+fn render_pieces(fit: &Fit) -> String {
+    let mut text = String::new();
+    if fit.pieces.is_empty() && fit.held_out.is_none() {
+        return text;
+    }
+    let out = fit.held_out.is_some();
+    let words = |words: [&str; 7]| words.map(String::from).to_vec();
+    let mut rows = vec![words(["", "samples", "RMS", "largest", "held out", "RMS", "largest"])];
+    for piece in &fit.pieces {
+        let [own_rms, own_max] = figures(&piece.fit);
+        let held = piece.held_out.as_ref().map(|f| (f.samples.to_string(), figures(f)));
+        let (n, [held_rms, held_max]) = held.unwrap_or_default();
+        let samples = piece.fit.samples.to_string();
+        rows.push(words([&piece.name, &samples, &own_rms, &own_max, &n, &held_rms, &held_max]));
+    }
+    if let Some(held_out) = &fit.held_out {
+        for (name, f) in [("all, calibrated", &held_out.model), ("all, as declared", &held_out.nominal)] {
+            let [held_rms, held_max] = figures(f);
+            rows.push(words([name, "", "", "", &f.samples.to_string(), &held_rms, &held_max]));
+        }
+    }
+    if !out {
+        rows.iter_mut().for_each(|row| row.truncate(4));
+    }
+    let title = if fit.pieces.is_empty() {
+        "samples that were held out"
+    } else {
+        "pieces by direction of travel (F forward, R reverse)"
+    };
+    let _ = writeln!(text, "\n{title}");
+    text.push_str(&table("  ", &[false, true, true, true, true, true, true][..rows[0].len()], &rows));
+    text
 }
 
 /// Share of the data from which a single component is listed.
@@ -174,13 +273,17 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
     }
     let mut rows = Vec::new();
     for p in shown {
-        let name = if p.setup.is_empty() { p.frame.clone() } else { format!("{}[{}]", p.frame, p.setup) };
+        let mut name = if p.setup.is_empty() { p.frame.clone() } else { format!("{}[{}]", p.frame, p.setup) };
+        if !p.directions.is_empty() {
+            let _ = write!(name, " ± with {}", p.directions);
+        }
         let kind = if p.component.starts_with('v') { Kind::Length } else { Kind::Angle };
         let (value, error, unit) = kind.show_with_error(p.value, p.std_error);
         let share = format!("{:.0} %", 100.0 * p.share);
         rows.push(vec![name, p.component.clone(), value, format!("± {error} {unit}"), share]);
     }
     text.push_str(&table("  ", &[false, false, true, false, true], &rows));
+    text.push_str(&render_pieces(fit));
     let seen = fit.combinations.iter().filter(|c| c.share > 0.5).count();
     let _ = writeln!(
         text,

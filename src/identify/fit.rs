@@ -4,11 +4,13 @@ use nalgebra::DVector;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::evaluator::{Evaluator, Moment};
+use super::judge::{Figures, PieceFit, Sizes, judge};
 use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
 use super::solve::Problem;
-use super::source::Known;
-use super::unknowns::{Block, Role};
-use super::{Evaluator, Found, Information, Loss, Options, Solver, Stop};
+use super::source::{Known, Which};
+use super::unknowns::{Block, Role, Unknowns};
+use super::{Found, Information, Loss, Options, Solver, Stop};
 
 use crate::error::Result;
 use crate::lie::Vec3;
@@ -77,8 +79,20 @@ pub struct Fit {
     pub outliers: u64,
     /// The worst of both, one by one.
     pub suspects: Vec<Suspect>,
+    /// The pieces of a model that is keyed on directions of travel; empty for others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pieces: Vec<PieceFit>,
+    /// Samples that were not used but judged, all pieces together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
+    /// Coefficients of the terms.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub coefficients: Vec<CoefficientFit>,
     /// What to be careful about, in sentences.
     pub warnings: Vec<String>,
+    /// Samples of the fit by piece.
+    #[serde(skip)]
+    pub piece_samples: Vec<u64>,
     /// The information behind it.
     #[serde(skip)]
     pub information: Information,
@@ -91,6 +105,24 @@ pub struct BeforeAfter {
     pub nominal: f64,
     /// With constant deviations.
     pub geometric: f64,
+}
+
+/// Residuals of samples that were held out.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct HeldOut {
+    /// Machine as declared, only what nobody has stated is fitted.
+    pub nominal: Figures,
+    /// With the model found.
+    pub model: Figures,
+}
+
+/// Coefficient of a term.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct CoefficientFit {
+    /// Its value, in its own SI unit.
+    pub value: f64,
+    /// Standard error, all other unknowns free.
+    pub std_error: f64,
 }
 
 /// How well one recording is described.
@@ -124,6 +156,9 @@ pub struct ParameterFit {
     pub frame: String,
     /// Set-up, where the component belongs to a frame `w` of its own; empty otherwise.
     pub setup: String,
+    /// Axes with whose direction of travel the component changes sign; empty for a constant one.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub directions: String,
     /// `vx` ... `wz`.
     pub component: String,
     /// Identified value, m or rad.
@@ -176,6 +211,7 @@ pub struct Suspect {
 pub(super) fn report(
     problem: &Problem,
     nominal: &[Tally],
+    declared: &Unknowns,
     found: &Found,
     information: Information,
     options: Options,
@@ -206,6 +242,8 @@ pub(super) fn report(
     let general = matrix_in_general(machine, sources, layout, &found.solution.unknowns);
     let rank_in_general = Information::new(&general, layout, problem.prior, Vec::new()).rank;
     let (outliers, suspects) = suspects(problem, found)?;
+    let coefficients = coefficients(problem, found, &information);
+    let Pieces { pieces, samples: piece_samples, held_out } = pieces(problem, declared, found)?;
     let fit = Fit {
         machine: machine.name().into(),
         samples: sources.samples(),
@@ -236,6 +274,10 @@ pub(super) fn report(
         down_weighted: tallies.iter().map(|t| t.down_weighted).sum(),
         outliers,
         suspects,
+        pieces,
+        held_out,
+        coefficients,
+        piece_samples,
         warnings: Vec::new(),
         information,
     };
@@ -266,26 +308,80 @@ fn setups(problem: &Problem, found: &Found) -> Vec<SetupFit> {
         .collect()
 }
 
-/// Frame and set-up of a block that has components.
-fn owner(problem: &Problem, block: &Block) -> Option<(String, String)> {
+/// Frame, set-up and directions of a block that has components.
+fn owner(problem: &Problem, block: &Block) -> Option<[String; 3]> {
     let frame = |j: usize| problem.machine.dyads()[j].frame.clone();
+    let none = String::new;
     match block.role {
-        Role::Dyad(j) => Some((frame(j), String::new())),
-        Role::Setup(s) => Some((frame(problem.machine.w_index()), problem.sources.setups[s].clone())),
+        Role::Dyad(j) => Some([frame(j), none(), none()]),
+        Role::Setup(s) => Some([frame(problem.machine.w_index()), problem.sources.setups[s].clone(), none()]),
+        Role::Part { set, dyad } => {
+            let directions = problem.varying.directions.as_ref()?;
+            Some([frame(dyad), none(), directions.set_name(problem.machine, set)])
+        }
         _ => None,
     }
+}
+
+fn coefficients(problem: &Problem, found: &Found, information: &Information) -> Vec<CoefficientFit> {
+    let terms = problem.layout.blocks.iter().filter(|b| matches!(b.role, Role::Term(_)));
+    terms
+        .map(|block| CoefficientFit {
+            value: found.solution.unknowns.total(block)[0],
+            std_error: information.variance[block.offset].sqrt() * block.scale[0],
+        })
+        .collect()
+}
+
+/// What is told of the pieces.
+struct Pieces {
+    pieces: Vec<PieceFit>,
+    /// By piece, those without any sample included.
+    samples: Vec<u64>,
+    held_out: Option<HeldOut>,
+}
+
+/// Residuals by piece, of the samples used and of those held out.
+fn pieces(problem: &Problem, declared: &Unknowns, found: &Found) -> Result<Pieces> {
+    let unknowns = &found.solution.unknowns;
+    let picked = problem.sources.is_picked();
+    let mut told = Pieces { pieces: Vec::new(), samples: Vec::new(), held_out: None };
+    if problem.varying.directions.is_none() && !picked {
+        return Ok(told);
+    }
+    let fit = judge(problem, unknowns, Which::Fit)?;
+    let out = if picked { Some(judge(problem, unknowns, Which::HeldOut)?) } else { None };
+    let all = |sizes: &[Sizes]| {
+        let mut sum = Sizes::default();
+        sizes.iter().for_each(|s| sum.add(s));
+        sum.figures()
+    };
+    if let Some(out) = &out {
+        let nominal = all(&judge(problem, declared, Which::HeldOut)?);
+        told.held_out = Some(HeldOut { nominal, model: all(out) });
+    }
+    told.samples = fit.iter().map(|sizes| sizes.figures().samples).collect();
+    if let Some(directions) = &problem.varying.directions {
+        for (piece, sizes) in fit.iter().enumerate().filter(|(piece, _)| told.samples[*piece] > 0) {
+            let name = directions.name(problem.machine, piece);
+            let held_out = out.as_ref().map(|out| out[piece].figures());
+            told.pieces.push(PieceFit { name, fit: sizes.figures(), held_out });
+        }
+    }
+    Ok(told)
 }
 
 fn parameters(problem: &Problem, found: &Found, information: &Information) -> Vec<ParameterFit> {
     let mut all = Vec::new();
     for block in problem.layout.blocks.iter().filter(|b| b.prior) {
-        let Some((frame, setup)) = owner(problem, block) else { continue };
+        let Some([frame, setup, directions]) = owner(problem, block) else { continue };
         let total = found.solution.unknowns.total(block);
         for k in 0..block.len {
             let variance = information.variance[block.offset + k];
             all.push(ParameterFit {
                 frame: frame.clone(),
                 setup: setup.clone(),
+                directions: directions.clone(),
                 component: COMPONENTS[k].into(),
                 value: total[k],
                 std_error: variance.sqrt() * block.scale[k],
@@ -299,7 +395,7 @@ fn parameters(problem: &Problem, found: &Found, information: &Information) -> Ve
 
 /// Name of every parameter, `frame.component`.
 fn labels(problem: &Problem) -> Vec<String> {
-    let sources = problem.sources;
+    let (sources, machine) = (problem.sources, problem.machine);
     let several = sources.setups.len() > 1;
     let of = |setup: usize| if several { format!("[{}]", sources.setups[setup]) } else { String::new() };
     let label = |block: &Block, k: usize| match block.role {
@@ -308,6 +404,12 @@ fn labels(problem: &Problem) -> Vec<String> {
         Role::ToolPoint(i) => format!("tool point {}.{}", sources.tool_points[i], ["x", "y", "z"][k]),
         Role::Zero(i) => format!("zero of {}{}", sources.zeros[i].1, of(sources.zeros[i].0)),
         Role::Length(i) => format!("nominal length{}", of(sources.lengths[i])),
+        Role::Part { set, dyad } => {
+            let axes =
+                problem.varying.directions.as_ref().map_or(String::new(), |d| d.set_name(machine, set));
+            format!("{}.{} with the direction of {axes}", machine.dyads()[dyad].frame, COMPONENTS[k])
+        }
+        Role::Term(i) => format!("term {}", i + 1),
     };
     problem.layout.blocks.iter().flat_map(|b| (0..b.len).map(move |k| label(b, k))).collect()
 }
@@ -356,16 +458,17 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
     let (commands, loss) = (machine.commands().len(), problem.loss);
     let (mut outliers, mut all) = (0, Vec::new());
     sources.pass(
-        |index, chunk| {
+        |index, samples| {
+            let chunk = samples.chunk;
             let (source, evaluator) = (&sources.all[index], &evaluators[index]);
             let sigmas = sigmas(source, machine, found.noise[index]);
             let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
-            let mut sweep = evaluator.workspace();
+            let mut work = evaluator.workspace();
             let (mut beyond, mut own) = (0, Vec::new());
             for k in 0..chunk.len {
                 let q = &chunk.commands[k * commands..(k + 1) * commands];
                 let measured = &chunk.values[k * width..(k + 1) * width];
-                let residuals = evaluator.residuals(q, measured, &mut sweep, None);
+                let residuals = evaluator.residuals(q, measured, Moment::At(samples, k), &mut work, None);
                 let e2 = standardised(&residuals[..count], &sigmas);
                 let (_, weight) = loss.at(e2);
                 beyond += u64::from(e2 > limits[index]);
@@ -442,7 +545,8 @@ fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
         warnings.push(format!("not seen by the recordings, left as declared: {open}"));
     }
     // A tolerance that the data contradict pulls at everything else.
-    let contradicted = fit.parameters.iter().filter(|p| p.value.abs() > CONTRADICTED * p.tolerance);
+    let constant = fit.parameters.iter().filter(|p| p.directions.is_empty());
+    let contradicted = constant.filter(|p| p.value.abs() > CONTRADICTED * p.tolerance);
     let mut frames: Vec<(&str, f64)> = Vec::new();
     for p in contradicted {
         let size = p.value.abs() / p.tolerance;

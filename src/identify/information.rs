@@ -184,8 +184,9 @@ fn pseudo_inverse(matrix: &DMatrix<f64>, largest: f64) -> DMatrix<f64> {
 /// over the scaled parameter vector. `geometry` is the data's matrix with measured points in place of modelled ones.
 pub(crate) fn open_directions(geometry: &DMatrix<f64>, layout: &Layout, least: f64) -> Vec<DVector<f64>> {
     let scales = layout.scales();
-    let has_prior = layout.mask(|b| b.prior);
-    let rest: Vec<usize> = (0..layout.len).filter(|i| !has_prior[*i]).collect();
+    // Coefficients of terms are the machine's, not the set-up's.
+    let of_setup = layout.mask(|b| !b.prior && !matches!(b.role, Role::Term(_)));
+    let rest: Vec<usize> = (0..layout.len).filter(|i| of_setup[*i]).collect();
     if rest.is_empty() {
         return Vec::new();
     }

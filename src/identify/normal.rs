@@ -4,18 +4,21 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
+use super::evaluator::{EXTRAS, Evaluator, Moment};
 use super::loss::Loss;
 use super::source::{Source, Sources};
 use super::thin::Thin;
 use super::unknowns::{Layout, Role, Unknowns};
-use crate::chain::{Chain, Sweep, deviation_jacobian};
+use crate::chain::deviation_jacobian;
 use crate::check::random_command;
 use crate::error::Result;
-use crate::lie::{Mat3, Pose, Twist, Vec3, Wrench};
+use crate::feature::Samples;
+use crate::lie::{Twist, Vec3, Wrench};
 use crate::machine::Machine;
+use crate::motion::Tracker;
 use crate::recording::Chunk;
 use crate::rms::Rms;
-use crate::sensor::{MOST_READINGS, Sensor, SensorState};
+use crate::sensor::{MOST_READINGS, Sensor};
 use crate::units::Quantity;
 
 /// Noise of a source's readings: standard deviation of lengths (m) and of angles (rad).
@@ -104,93 +107,6 @@ impl Normal {
     }
 }
 
-/// Extra columns of a source behind the six of each dyad: tool point, zero, length.
-const EXTRAS: usize = 5;
-
-/// Residuals and, if wanted, Jacobian rows of a sample.
-pub(crate) struct Evaluator<'a> {
-    pub machine: &'a Machine,
-    pub chain: Chain<f64>,
-    pub state: SensorState<f64>,
-    pub sensor: &'a Sensor,
-    pub dh: &'a [Twist<f64>],
-}
-
-impl<'a> Evaluator<'a> {
-    pub fn new(machine: &'a Machine, unknowns: &'a Unknowns, source: &'a Source) -> Self {
-        Evaluator {
-            machine,
-            chain: unknowns.chain(machine, source.setup),
-            state: unknowns.sensor_state(source),
-            sensor: &source.sensor,
-            dh: &unknowns.dh,
-        }
-    }
-
-    /// The residuals, measured minus model, m and rad. With `rows`, the columns of the transposed Jacobian as well.
-    pub fn residuals(
-        &self,
-        q: &[f64],
-        measured: &[f64],
-        sweep: &mut Sweep<f64>,
-        mut rows: Option<&mut [f64]>,
-    ) -> [f64; MOST_READINGS] {
-        let mut residuals = [0.0; MOST_READINGS];
-        let dyads = self.machine.dyads().len();
-        let width = 6 * dyads + EXTRAS;
-        if let Some(rows) = &mut rows {
-            rows[..self.sensor.reading_count() * width].fill(0.0);
-        }
-        if let Sensor::Joint { dyad } = *self.sensor {
-            residuals[0] = measured[0] - self.joint_reading(dyad, q);
-            if let Some(rows) = &mut rows {
-                let xi = self.joint_twist(dyad).to_array();
-                rows[6 * dyad..6 * dyad + 6].copy_from_slice(&xi);
-                rows[6 * dyads + 3] = 1.0;
-            }
-            return residuals;
-        }
-        self.chain.sweep_into(q, sweep);
-        let rotation = match self.sensor {
-            Sensor::Pose => {
-                Pose::exp(Twist::from_array([0.0, 0.0, 0.0, measured[3], measured[4], measured[5]])).rotation
-            }
-            _ => Mat3::identity(0.0),
-        };
-        let (readings, count) = self.sensor.readings(sweep, &self.state, rotation);
-        let relative = matches!(self.sensor, Sensor::Distance { absolute: false });
-        for (i, reading) in readings.iter().take(count).enumerate() {
-            let reference = if i < 3 { measured[i] } else { 0.0 };
-            residuals[i] = reference - reading.value;
-            if let Some(rows) = &mut rows {
-                let row = &mut rows[i * width..(i + 1) * width];
-                sweep.error_row(reading.by_twist_w, &mut row[..6 * dyads]);
-                row[6 * dyads..6 * dyads + 3].copy_from_slice(&reading.by_tool_point_t.0);
-                row[6 * dyads + 3] = if self.sensor.has_zero() { 1.0 } else { 0.0 };
-                row[6 * dyads + 4] = if relative { -1.0 } else { 0.0 };
-            }
-        }
-        residuals
-    }
-
-    /// `q + xi·dh + zero`, `docs/model.md` (19).
-    pub fn joint_reading(&self, dyad: usize, q: &[f64]) -> f64 {
-        let drive = self.machine.drive(dyad).expect("a measured joint has a drive");
-        let displacement: f64 = drive.terms.iter().map(|(c, factor)| factor * q[*c]).sum();
-        let (xi, dh) = (self.joint_twist(dyad), self.dh[dyad]);
-        displacement + xi.v.dot(dh.v) + xi.w.dot(dh.w) + self.state.zero
-    }
-
-    fn joint_twist(&self, dyad: usize) -> Twist<f64> {
-        self.machine.dyads()[dyad].joint.as_ref().expect("a measured joint is a joint").twist()
-    }
-
-    /// A sweep to work in.
-    pub fn workspace(&self) -> Sweep<f64> {
-        self.chain.sweep(&vec![0.0; self.machine.commands().len()])
-    }
-}
-
 /// Squared standardised residual per reading of a sample.
 pub(crate) fn standardised(residuals: &[f64], sigmas: &[f64]) -> f64 {
     let sum: f64 = residuals.iter().zip(sigmas).map(|(r, s)| (r / s) * (r / s)).sum();
@@ -202,12 +118,34 @@ pub(crate) fn sigmas(source: &Source, machine: &Machine, noise: Noise) -> Vec<f6
     (0..source.sensor.reading_count()).map(|i| noise.of(source.quantity(machine, i))).collect()
 }
 
-/// What one chunk adds; local columns: six of each dyad, then the extras.
+/// What one chunk adds, by piece of the model; local columns: six of each dyad, the extras, the terms.
 struct Part {
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
+    pieces: Vec<Option<Piece>>,
     loss: f64,
     tally: Tally,
+}
+
+/// Normal equations of the samples of one pattern of directions.
+struct Piece {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Part {
+    fn add(&mut self, other: Part) {
+        for (own, other) in self.pieces.iter_mut().zip(other.pieces) {
+            match (own, other) {
+                (Some(own), Some(other)) => {
+                    own.matrix += other.matrix;
+                    own.gradient += other.gradient;
+                }
+                (own, Some(other)) => *own = Some(other),
+                (_, None) => {}
+            }
+        }
+        self.loss += other.loss;
+        self.tally.add(&other.tally);
+    }
 }
 
 /// One pass over all data.
@@ -219,79 +157,69 @@ pub(crate) fn accumulate(
     noise: &[Noise],
     loss: Loss,
 ) -> Result<Normal> {
-    let width = 6 * machine.dyads().len() + EXTRAS;
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let mut sums: Vec<Option<Part>> = sources.all.iter().map(|_| None).collect();
     sources.pass(
-        |index, chunk| {
+        |index, samples| {
             let sigmas = sigmas(&sources.all[index], machine, noise[index]);
-            part(&evaluators[index], &sources.all[index], chunk, &sigmas, loss, width)
+            part(&evaluators[index], &sources.all[index], samples, &sigmas, loss)
         },
         |index, part| match &mut sums[index] {
             None => sums[index] = Some(part),
-            Some(sum) => {
-                sum.matrix += part.matrix;
-                sum.gradient += part.gradient;
-                sum.loss += part.loss;
-                sum.tally.add(&part.tally);
-            }
+            Some(sum) => sum.add(part),
         },
     )?;
     let mut normal = Normal::zero(layout, sources.all.len());
     for (index, sum) in sums.into_iter().enumerate() {
-        let Some(mut sum) = sum else { continue };
-        let source = &sources.all[index];
-        if source.sees_frames() {
-            turn_into_coordinates(&mut sum, machine, unknowns, source.setup);
-        }
-        scatter(&mut normal, &sum, machine, layout, source);
-        normal.loss += sum.loss;
-        normal.tallies[index] = sum.tally;
+        let Some(sum) = sum else { continue };
+        normal.take(sum, index, &evaluators[index], layout, &sources.all[index], unknowns);
     }
     Ok(normal)
 }
 
-fn part(
-    evaluator: &Evaluator,
-    source: &Source,
-    chunk: &Chunk,
-    sigmas: &[f64],
-    loss: Loss,
-    width: usize,
-) -> Part {
-    let (count, commands) = (source.sensor.reading_count(), evaluator.machine.commands().len());
+fn part(evaluator: &Evaluator, source: &Source, samples: &Samples, sigmas: &[f64], loss: Loss) -> Part {
+    let (count, width) = (source.sensor.reading_count(), evaluator.width());
+    let (chunk, commands) = (samples.chunk, samples.commands);
     let values = source.recording.value_count();
-    let mut rows = DMatrix::<f64>::zeros(width, chunk.len * count);
-    let mut whitened = DVector::<f64>::zeros(chunk.len * count);
-    let mut sweep = evaluator.workspace();
+    let piece_count = evaluator.piece_count();
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); piece_count];
+    (0..chunk.len).for_each(|k| members[evaluator.piece(Moment::At(samples, k))].push(k));
+    let mut work = evaluator.workspace();
     let mut total = 0.0;
     let mut tally = Tally { samples: chunk.len as u64, ..Tally::default() };
-    for k in 0..chunk.len {
-        let q = &chunk.commands[k * commands..(k + 1) * commands];
-        let measured = &chunk.values[k * values..(k + 1) * values];
-        let slot = &mut rows.as_mut_slice()[k * count * width..(k + 1) * count * width];
-        let residuals = evaluator.residuals(q, measured, &mut sweep, Some(slot));
-        let residuals = &residuals[..count];
-        let (rho, weight) = loss.at(standardised(residuals, sigmas));
-        total += count as f64 * rho;
-        tally.down_weighted += u64::from(weight < 0.5);
-        for (i, (residual, sigma)) in residuals.iter().zip(sigmas).enumerate() {
-            let factor = weight.sqrt() / sigma;
-            whitened[k * count + i] = residual * factor;
-            slot[i * width..(i + 1) * width].iter_mut().for_each(|x| *x *= factor);
-            let angle = count == 6 && i >= 3 || count == 1 && source_is_angle(source, evaluator.machine);
-            let sums = if angle { &mut tally.angle } else { &mut tally.length };
-            sums.rows += 1;
-            sums.squares += residual * residual;
-            // The noise is that of the samples that the model claims to describe.
-            if weight > COUNTS {
-                sums.inliers += 1;
-                sums.inlier_squares += residual * residual;
+    let angular = source_is_angle(source, evaluator.machine);
+    let mut piece = |members: &[usize]| {
+        let mut rows = DMatrix::<f64>::zeros(width, members.len() * count);
+        let mut whitened = DVector::<f64>::zeros(members.len() * count);
+        for (slot, k) in members.iter().enumerate() {
+            let q = &chunk.commands[k * commands..(k + 1) * commands];
+            let measured = &chunk.values[k * values..(k + 1) * values];
+            let own = &mut rows.as_mut_slice()[slot * count * width..(slot + 1) * count * width];
+            let residuals =
+                evaluator.residuals(q, measured, Moment::At(samples, *k), &mut work, Some(&mut *own));
+            let residuals = &residuals[..count];
+            let (rho, weight) = loss.at(standardised(residuals, sigmas));
+            total += count as f64 * rho;
+            tally.down_weighted += u64::from(weight < 0.5);
+            for (i, (residual, sigma)) in residuals.iter().zip(sigmas).enumerate() {
+                let factor = weight.sqrt() / sigma;
+                whitened[slot * count + i] = residual * factor;
+                own[i * width..(i + 1) * width].iter_mut().for_each(|x| *x *= factor);
+                let angle = count == 6 && i >= 3 || count == 1 && angular;
+                let sums = if angle { &mut tally.angle } else { &mut tally.length };
+                sums.rows += 1;
+                sums.squares += residual * residual;
+                // The noise is that of the samples that the model claims to describe.
+                if weight > COUNTS {
+                    sums.inliers += 1;
+                    sums.inlier_squares += residual * residual;
+                }
             }
         }
-    }
-    let matrix = &rows * rows.transpose();
-    Part { matrix, gradient: &rows * whitened, loss: total, tally }
+        Piece { matrix: &rows * rows.transpose(), gradient: &rows * whitened }
+    };
+    let pieces = members.iter().map(|members| (!members.is_empty()).then(|| piece(members))).collect();
+    Part { pieces, loss: total, tally }
 }
 
 fn source_is_angle(source: &Source, machine: &Machine) -> bool {
@@ -299,50 +227,83 @@ fn source_is_angle(source: &Source, machine: &Machine) -> bool {
 }
 
 /// From increments behind `exp(dh)` to the deviations' own coordinates, `docs/model.md` (12).
-fn turn_into_coordinates(sum: &mut Part, machine: &Machine, unknowns: &Unknowns, setup: usize) {
-    let width = sum.gradient.len();
+fn turn_into_coordinates(piece: &mut Piece, evaluator: &Evaluator, deviations: &[Twist<f64>]) {
+    let width = piece.gradient.len();
     let mut turn = DMatrix::identity(width, width);
-    for j in 0..machine.dyads().len() {
-        let dh = if j == machine.w_index() { unknowns.setups[setup].dh } else { unknowns.dh[j] };
-        let block = deviation_jacobian(dh);
+    for (j, dh) in deviations.iter().enumerate().filter(|(j, _)| !evaluator.is_turned(*j)) {
+        let block = deviation_jacobian(*dh);
         for (a, row) in block.iter().enumerate() {
             for (b, x) in row.iter().enumerate() {
                 turn[(6 * j + a, 6 * j + b)] = *x;
             }
         }
     }
-    sum.matrix = turn.transpose() * &sum.matrix * &turn;
-    sum.gradient = turn.transpose() * &sum.gradient;
+    piece.matrix = turn.transpose() * &piece.matrix * &turn;
+    piece.gradient = turn.transpose() * &piece.gradient;
 }
 
-/// Adds a source's local sums where its unknowns stand in the parameter vector.
-fn scatter(normal: &mut Normal, sum: &Part, machine: &Machine, layout: &Layout, source: &Source) {
-    let dyads = machine.dyads().len();
-    let mut place = vec![None; sum.gradient.len()];
-    let mut put = |local: usize, len: usize, role: Role| {
-        if let Some(block) = layout.block(role) {
-            (0..len).for_each(|k| place[local + k] = Some(block.offset + k));
+impl Normal {
+    /// Adds a source's local sums.
+    fn take(
+        &mut self,
+        sum: Part,
+        index: usize,
+        evaluator: &Evaluator,
+        layout: &Layout,
+        source: &Source,
+        unknowns: &Unknowns,
+    ) {
+        let directions = unknowns.varying.directions.as_ref();
+        for (at, piece) in sum.pieces.into_iter().enumerate() {
+            let Some(mut piece) = piece else { continue };
+            if source.sees_frames() {
+                turn_into_coordinates(&mut piece, evaluator, evaluator.deviations(at));
+            }
+            let factors: Vec<f64> =
+                directions.map_or(Vec::new(), |d| (0..d.sets().len()).map(|s| d.factor(s, at)).collect());
+            self.scatter(&piece, evaluator.machine, layout, source, &factors);
         }
-    };
-    for j in 0..dyads {
-        let role = if j == machine.w_index() { Role::Setup(source.setup) } else { Role::Dyad(j) };
-        put(6 * j, 6, role);
+        self.loss += sum.loss;
+        self.tallies[index] = sum.tally;
     }
-    if let Some(i) = source.tool_point.unknown() {
-        put(6 * dyads, 3, Role::ToolPoint(i));
-    }
-    if let Some(i) = source.zero.unknown() {
-        put(6 * dyads + 3, 1, Role::Zero(i));
-    }
-    if let Some(i) = source.length.unknown() {
-        put(6 * dyads + 4, 1, Role::Length(i));
-    }
-    for (a, to_a) in place.iter().enumerate() {
-        let Some(to_a) = *to_a else { continue };
-        normal.gradient[to_a] += sum.gradient[a];
-        for (b, to_b) in place.iter().enumerate() {
-            if let Some(to_b) = *to_b {
-                normal.matrix[(to_a, to_b)] += sum.matrix[(a, b)];
+
+    /// Adds local sums where their unknowns stand in the parameter vector; a column of a dyad counts for its constant deviation
+    /// and, times the set's factor, for each of its direction parts.
+    fn scatter(&mut self, sum: &Piece, machine: &Machine, layout: &Layout, source: &Source, factors: &[f64]) {
+        let dyads = machine.dyads().len();
+        let mut places: Vec<Vec<(usize, f64)>> = vec![Vec::new(); sum.gradient.len()];
+        let mut put = |local: usize, len: usize, role: Role, factor: f64| {
+            if let Some(block) = layout.block(role).filter(|_| factor != 0.0) {
+                (0..len).for_each(|k| places[local + k].push((block.offset + k, factor)));
+            }
+        };
+        for j in 0..dyads {
+            let role = if j == machine.w_index() { Role::Setup(source.setup) } else { Role::Dyad(j) };
+            put(6 * j, 6, role, 1.0);
+            for (set, factor) in factors.iter().enumerate() {
+                put(6 * j, 6, Role::Part { set, dyad: j }, *factor);
+            }
+        }
+        if let Some(i) = source.tool_point.unknown() {
+            put(6 * dyads, 3, Role::ToolPoint(i), 1.0);
+        }
+        if let Some(i) = source.zero.unknown() {
+            put(6 * dyads + 3, 1, Role::Zero(i), 1.0);
+        }
+        if let Some(i) = source.length.unknown() {
+            put(6 * dyads + 4, 1, Role::Length(i), 1.0);
+        }
+        for local in 6 * dyads + EXTRAS..sum.gradient.len() {
+            put(local, 1, Role::Term(local - 6 * dyads - EXTRAS), 1.0);
+        }
+        for (a, to) in places.iter().enumerate() {
+            for (to_a, factor_a) in to {
+                self.gradient[*to_a] += factor_a * sum.gradient[a];
+                for (b, to) in places.iter().enumerate() {
+                    for (to_b, factor_b) in to {
+                        self.matrix[(*to_a, *to_b)] += factor_a * factor_b * sum.matrix[(a, b)];
+                    }
+                }
             }
         }
     }
@@ -363,19 +324,19 @@ pub(crate) fn set_up_geometry(
     noise: &[Noise],
     thin: &[Thin],
 ) -> DMatrix<f64> {
-    let width = 6 * machine.dyads().len() + EXTRAS;
     let w = 6 * machine.w_index();
     let mut normal = Normal::zero(layout, sources.all.len());
-    let mut rows = vec![0.0; MOST_READINGS * width];
     for (index, source) in sources.all.iter().enumerate() {
         let evaluator = Evaluator::new(machine, unknowns, source);
-        let mut sweep = evaluator.workspace();
+        let width = evaluator.width();
+        let mut rows = vec![0.0; MOST_READINGS * width];
+        let mut work = evaluator.workspace();
         let sigmas = sigmas(source, machine, noise[index]);
         let own: Vec<&Thin> = thin.iter().filter(|t| t.source == index).collect();
         let each_stands_for = source.summary.samples as f64 / own.len().max(1) as f64;
         let mut matrix = DMatrix::zeros(width, width);
         for sample in own {
-            evaluator.residuals(&sample.q, &sample.values, &mut sweep, Some(&mut rows));
+            evaluator.residuals(&sample.q, &sample.values, Moment::Still, &mut work, Some(&mut rows));
             for (i, sigma) in sigmas.iter().enumerate() {
                 let row = &mut rows[i * width..(i + 1) * width];
                 if i < 3 && matches!(source.sensor, Sensor::Position | Sensor::Pose) {
@@ -387,43 +348,36 @@ pub(crate) fn set_up_geometry(
                 matrix.ger(each_stands_for / (sigma * sigma), &row, &row, 1.0);
             }
         }
-        let sum = Part { matrix, gradient: DVector::zeros(width), loss: 0.0, tally: Tally::default() };
-        scatter(&mut normal, &sum, machine, layout, source);
+        normal.scatter(&Piece { matrix, gradient: DVector::zeros(width) }, machine, layout, source, &[]);
     }
     normal.matrix
 }
 
-/// The data's matrix on general poses of the same instruments: random commands within limits, everything moving.
+/// The data's matrix on general poses of the same instruments: random commands within limits, everything moving both ways.
 pub(crate) fn matrix_in_general(
     machine: &Machine,
     sources: &Sources,
     layout: &Layout,
     unknowns: &Unknowns,
 ) -> DMatrix<f64> {
-    let width = 6 * machine.dyads().len() + EXTRAS;
     let mut rng = StdRng::seed_from_u64(20_260_104);
-    let samples = 2 * layout.len;
+    let (samples, commands) = (2 * layout.len, machine.commands().len());
     let mut normal = Normal::zero(layout, sources.all.len());
-    for source in &sources.all {
+    for (index, source) in sources.all.iter().enumerate() {
         let evaluator = Evaluator::new(machine, unknowns, source);
-        let commands = (0..samples * machine.commands().len())
-            .map(|i| random_command(machine, i % machine.commands().len(), &mut rng));
         let chunk = Chunk {
             len: samples,
-            lines: Vec::new(),
-            time: None,
-            commands: commands.collect(),
+            commands: (0..samples * commands)
+                .map(|i| random_command(machine, i % commands, &mut rng))
+                .collect(),
             values: vec![0.0; samples * source.recording.value_count()],
-            directions: Vec::new(),
-            channels: Vec::new(),
-            dropped: 0,
+            ..Chunk::default()
         };
+        let motion = Tracker::new(vec![0.0; commands], vec![1; commands]).follow(&chunk);
+        let samples = Samples { chunk: &chunk, motion: &motion, commands };
         let sigmas = vec![1.0; source.sensor.reading_count()];
-        let mut sum = part(&evaluator, source, &chunk, &sigmas, Loss::Squares, width);
-        if source.sees_frames() {
-            turn_into_coordinates(&mut sum, machine, unknowns, source.setup);
-        }
-        scatter(&mut normal, &sum, machine, layout, source);
+        let part = part(&evaluator, source, &samples, &sigmas, Loss::Squares);
+        normal.take(part, index, &evaluator, layout, source, unknowns);
     }
     normal.matrix
 }

@@ -11,6 +11,7 @@ use super::thin::Thin;
 use super::unknowns::{Block, Layout, Unknowns};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
+use crate::variation::Varying;
 
 /// How the identification walks to its optimum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -69,6 +70,8 @@ pub(crate) struct Problem<'a> {
     pub machine: &'a Machine,
     pub sources: &'a Sources<'a>,
     pub layout: &'a Layout,
+    /// What deviations depend on.
+    pub varying: &'a Varying,
     pub loss: Loss,
     /// Whether the prior of the blocks that have one counts.
     pub prior: bool,
@@ -101,12 +104,14 @@ impl<'a> Problem<'a> {
         machine: &'a Machine,
         sources: &'a Sources<'a>,
         layout: &'a Layout,
+        varying: &'a Varying,
         free: impl Fn(&Block) -> bool,
     ) -> Self {
         Problem {
             machine,
             sources,
             layout,
+            varying,
             loss: Loss::default(),
             prior: true,
             free: layout.mask(free),

@@ -1,6 +1,7 @@
 //! A thin selection of samples for what does not need all of them: alignment and robust scales.
 
-use super::normal::{Evaluator, Noise};
+use super::evaluator::{Evaluator, Moment};
+use super::normal::Noise;
 use super::source::Sources;
 use super::unknowns::Unknowns;
 use crate::error::Result;
@@ -26,7 +27,7 @@ pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
     let mut all = Vec::new();
     // The chunks come in order, so the running number of a sample is known when they are merged.
     sources.pass(
-        |_, chunk| (chunk.commands.clone(), chunk.values.clone(), chunk.len),
+        |_, samples| (samples.chunk.commands.clone(), samples.chunk.values.clone(), samples.chunk.len),
         |index, (q, values, len)| {
             let source = &sources.all[index];
             let width = source.recording.value_count();
@@ -58,8 +59,8 @@ pub(crate) fn robust_noise(
     let mut sizes: Vec<[Vec<f64>; 2]> = sources.all.iter().map(|_| Default::default()).collect();
     for sample in thin {
         let (evaluator, source) = (&evaluators[sample.source], &sources.all[sample.source]);
-        let mut sweep = evaluator.workspace();
-        let residuals = evaluator.residuals(&sample.q, &sample.values, &mut sweep, None);
+        let mut work = evaluator.workspace();
+        let residuals = evaluator.residuals(&sample.q, &sample.values, Moment::Still, &mut work, None);
         // The first source of this kind collects for all of them.
         let group = kinds.iter().position(|k| *k == kinds[sample.source]).unwrap_or(sample.source);
         for (i, r) in residuals.iter().take(source.sensor.reading_count()).enumerate() {

@@ -7,6 +7,7 @@ use crate::chain::Chain;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::Machine;
 use crate::sensor::SensorState;
+use crate::variation::Varying;
 
 /// What a block of parameters stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +22,10 @@ pub(crate) enum Role {
     Zero(usize),
     /// Unknown length.
     Length(usize),
+    /// What of dyad `dyad` changes sign with the directions of a set of axes, six numbers.
+    Part { set: usize, dyad: usize },
+    /// Coefficient of a term.
+    Term(usize),
 }
 
 /// A block of the parameter vector.
@@ -43,8 +48,8 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Every dyad but `w`, then frames, tool points, zeros and lengths of the set-ups.
-    pub fn new(machine: &Machine, sources: &Sources) -> Self {
+    /// Every dyad but `w`, then frames, tool points, zeros and lengths of the set-ups, then what varies.
+    pub fn new(machine: &Machine, sources: &Sources, varying: &Varying) -> Self {
         let mut layout = Layout { blocks: Vec::new(), len: 0 };
         let tolerance = |j| machine.tolerance(j).to_array();
         for j in (0..machine.dyads().len()).filter(|j| *j != machine.w_index()) {
@@ -74,6 +79,17 @@ impl Layout {
         }
         for i in 0..sources.lengths.len() {
             layout.push(Role::Length(i), 1, [free(machine.t_index()).0; 6], false);
+        }
+        if let Some(directions) = &varying.directions {
+            for set in 0..directions.sets().len() {
+                for dyad in 0..machine.dyads().len() {
+                    let scale = directions.tolerance(machine, set, dyad);
+                    layout.push(Role::Part { set, dyad }, 6, scale, true);
+                }
+            }
+        }
+        for (i, term) in varying.terms.iter().enumerate() {
+            layout.push(Role::Term(i), 1, [term.scale; 6], term.prior);
         }
         layout
     }
@@ -134,11 +150,17 @@ pub(crate) struct Unknowns {
     pub tool_points: Vec<Vec3<f64>>,
     pub zeros: Vec<f64>,
     pub lengths: Vec<f64>,
+    /// What deviations depend on.
+    pub varying: Varying,
+    /// Direction parts by set and dyad.
+    pub parts: Vec<Vec<Twist<f64>>>,
+    /// Coefficients of the terms.
+    pub coefficients: Vec<f64>,
 }
 
 impl Unknowns {
     /// Everything as the machine file says.
-    pub fn nominal(machine: &Machine, sources: &Sources) -> Self {
+    pub fn nominal(machine: &Machine, sources: &Sources, varying: &Varying) -> Self {
         let zero = Twist::zero(0.0);
         let frame = |unknown: &bool| SetupFrame {
             previous_from_w: machine.dyads()[machine.w_index()].placement.pose(),
@@ -151,10 +173,16 @@ impl Unknowns {
             tool_points: vec![Vec3([0.0; 3]); sources.tool_points.len()],
             zeros: vec![0.0; sources.zeros.len()],
             lengths: vec![0.0; sources.lengths.len()],
+            varying: varying.clone(),
+            parts: vec![
+                vec![zero; machine.dyads().len()];
+                varying.directions.as_ref().map_or(0, |d| d.sets().len())
+            ],
+            coefficients: vec![0.0; varying.terms.len()],
         }
     }
 
-    /// The chain that a source's set-up sees.
+    /// The chain that a source's set-up sees, with constant deviations alone.
     pub fn chain(&self, machine: &Machine, setup: usize) -> Chain<f64> {
         let mut chain = Chain::new(machine, &self.dh);
         chain.set_previous_from_frame(machine.w_index(), self.setups[setup].pose());
@@ -183,6 +211,8 @@ impl Unknowns {
         match block.role {
             Role::Dyad(j) => self.dh[j].to_array(),
             Role::Setup(s) => self.setups[s].dh.to_array(),
+            Role::Part { set, dyad } => self.parts[set][dyad].to_array(),
+            Role::Term(i) => [self.coefficients[i]; 6],
             Role::ToolPoint(_) | Role::Zero(_) | Role::Length(_) => [0.0; 6],
         }
     }
@@ -209,6 +239,11 @@ impl Unknowns {
                 }
                 Role::Zero(i) => next.zeros[i] += at(0),
                 Role::Length(i) => next.lengths[i] += at(0),
+                Role::Part { set, dyad } => {
+                    let part = &mut next.parts[set][dyad];
+                    *part = *part + Twist::from_array(std::array::from_fn(at));
+                }
+                Role::Term(i) => next.coefficients[i] += at(0),
             }
         }
         next

@@ -147,6 +147,12 @@ pub enum MachineFault {
         /// The machine's frames.
         known: String,
     },
+    /// Pieces of a calibration that do not fit together.
+    #[error("{what}")]
+    BadPieces {
+        /// What is wrong.
+        what: String,
+    },
 }
 
 impl MachineFault {
@@ -191,6 +197,7 @@ impl MachineFault {
             NcWord { .. } => "write address: letters and digits such as \"B\" or \"C1\", sign: 1 or -1".into(),
             NoJoint => "a machine needs a joint: (frame: \"x\", joint: Prismatic(axis: \"x\"))".into(),
             UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
+            BadPieces { .. } => "write the pieces as `calibrate --directions` does".into(),
         }
     }
 }

@@ -32,6 +32,26 @@ pub struct Chunk {
     pub dropped: u64,
 }
 
+impl Chunk {
+    /// These samples alone, by their index; the count of dropped rows is left behind.
+    pub fn chosen(&self, samples: &[usize]) -> Chunk {
+        let rows = |all: &[f64]| -> Vec<f64> {
+            let width = all.len() / self.len.max(1);
+            samples.iter().flat_map(|k| all[k * width..(k + 1) * width].iter().copied()).collect()
+        };
+        Chunk {
+            len: samples.len(),
+            lines: samples.iter().filter_map(|k| self.lines.get(*k).copied()).collect(),
+            time: self.time.as_deref().map(rows),
+            commands: rows(&self.commands),
+            values: rows(&self.values),
+            directions: self.directions.iter().map(|d| d.as_deref().map(rows)).collect(),
+            channels: self.channels.iter().map(|c| rows(c)).collect(),
+            dropped: 0,
+        }
+    }
+}
+
 /// Samples of one pass, in chunks; see [`Recording::chunks`].
 pub struct Chunks<'a> {
     pub(super) pass: Pass<'a>,
