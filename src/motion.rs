@@ -4,6 +4,10 @@
 //! beside a chunk ([`Motion`]). A dwell keeps the last direction, the samples before the first motion take that motion's, and a
 //! dead band keeps jitter from counting as a reversal.
 
+mod rates;
+
+pub(crate) use rates::{LOOK_AHEAD, Rates};
+
 use crate::recording::Chunk;
 
 /// Columns of history beside a [`Chunk`], `len` rows of one number a command.
@@ -33,13 +37,13 @@ impl Motion {
 
 /// Where one command stands in its history.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+pub(crate) struct Axis {
     /// 0 before the first motion.
-    direction: i8,
+    pub direction: i8,
     /// Furthest point in the present direction; the first position before the first motion.
     furthest: f64,
     /// Where the present direction began.
-    turned_at: f64,
+    pub turned_at: f64,
 }
 
 /// Follows the directions of travel of all commands.
@@ -77,19 +81,8 @@ impl Tracker {
     /// `None` leave the direction to the motion.
     pub fn advance(&mut self, q: &[f64], stated: impl Fn(usize) -> Option<i8>) {
         for (c, (axis, q)) in self.axes.iter_mut().zip(q).enumerate() {
-            let band = self.dead_bands[c];
-            let axis = axis.get_or_insert(Axis { direction: 0, furthest: *q, turned_at: *q });
-            match stated(c) {
-                Some(direction) if direction != 0 => {
-                    if direction != axis.direction {
-                        *axis = Axis { direction, furthest: *q, turned_at: axis.furthest };
-                    }
-                    axis.furthest = *q;
-                }
-                // With a column, what it leaves open is no motion.
-                Some(_) => {}
-                None => axis.follow(*q, band),
-            }
+            let axis = axis.get_or_insert_with(|| Axis::at(*q));
+            axis.advance(*q, stated(c), self.dead_bands[c]);
         }
     }
 
@@ -115,6 +108,26 @@ impl Tracker {
 }
 
 impl Axis {
+    /// Before the first motion.
+    pub fn at(q: f64) -> Self {
+        Axis { direction: 0, furthest: q, turned_at: q }
+    }
+
+    /// Moves on to `q`; `stated` is a direction of approach from a column, where there is one.
+    pub fn advance(&mut self, q: f64, stated: Option<i8>, band: f64) {
+        match stated {
+            Some(direction) if direction != 0 => {
+                if direction != self.direction {
+                    *self = Axis { direction, furthest: q, turned_at: self.furthest };
+                }
+                self.furthest = q;
+            }
+            // With a column, what it leaves open is no motion.
+            Some(_) => {}
+            None => self.follow(q, band),
+        }
+    }
+
     fn follow(&mut self, q: f64, band: f64) {
         let gone = q - self.furthest;
         let sign = if gone > 0.0 { 1 } else { -1 };
@@ -127,7 +140,7 @@ impl Axis {
 }
 
 /// Direction of approach that a recording states for a sample.
-fn stated(chunk: &Chunk, command: usize, sample: usize) -> Option<i8> {
+pub(crate) fn stated(chunk: &Chunk, command: usize, sample: usize) -> Option<i8> {
     let column = chunk.directions.get(command)?.as_ref()?;
     Some(if column[sample] == 0.0 { 0 } else { column[sample].signum() as i8 })
 }

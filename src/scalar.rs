@@ -26,6 +26,9 @@ pub trait Scalar:
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
 
+    /// `e` to the power of `self`.
+    fn exp(self) -> Self;
+
     /// Angle in rad of the point (`x`, `self`), as [`f64::atan2`].
     fn atan2(self, x: Self) -> Self;
 
@@ -63,6 +66,10 @@ impl Scalar for f64 {
         f64::sin_cos(self)
     }
     #[inline(always)]
+    fn exp(self) -> Self {
+        f64::exp(self)
+    }
+    #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         f64::atan2(self, x)
     }
@@ -91,6 +98,10 @@ macro_rules! dual_scalar {
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
                 DualNum::sin_cos(&self)
+            }
+            #[inline(always)]
+            fn exp(self) -> Self {
+                DualNum::exp(&self)
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {

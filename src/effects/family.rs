@@ -1,0 +1,268 @@
+//! A family of effects as it is written in RON.
+
+use serde::{Deserialize, Serialize};
+
+use crate::feature::{Dimension, Expression};
+use crate::machine::JointKind;
+use crate::units::Unit;
+
+/// What the field has a name for. Entries of one name may differ from seat to seat.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename = "family", deny_unknown_fields)]
+pub struct Family {
+    /// Name, as in findings.
+    pub name: String,
+    /// Symbol of a standard, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub symbol: Option<String>,
+    /// What goes on in the machine.
+    pub about: String,
+    /// Where it can sit.
+    pub sits: Vec<Seat>,
+    /// The other joint, for families that take pairs: there is then a candidate for each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partner: Option<Partner>,
+    /// Whether the deviation stands before or behind the joint.
+    #[serde(default)]
+    pub pivot: Pivot,
+    /// Directions in se(3): each feature has one coefficient for each direction.
+    #[serde(default)]
+    pub directions: Vec<Directions>,
+    /// What the deviation depends on.
+    #[serde(default)]
+    pub features: Vec<Expression>,
+    /// Where features enter in their order: how many there are at least. All of them, if this is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least: Option<usize>,
+    /// What features depend on beside the recording.
+    #[serde(default)]
+    pub parameters: Vec<ParameterForm>,
+    /// For effects that are no deviation but spread: what their variance depends on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scatter: Option<Expression>,
+    /// Size of the deviation, root mean square, that is usual on machines in use.
+    #[serde(default)]
+    pub size: Size,
+    /// How often it is met, against 1 for backlash.
+    pub often: f64,
+    /// What is reported.
+    #[serde(default)]
+    pub coefficients: Vec<Output>,
+    /// One sentence for a machinist; names in braces stand for coefficients, `{at}` for the place, `{partner}` for the other joint.
+    pub sentence: String,
+    /// What it may be taken for.
+    #[serde(default)]
+    pub look_alikes: Vec<LookAlike>,
+    /// Where this is written.
+    #[serde(default)]
+    pub source: String,
+}
+
+/// Where an effect can sit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Seat {
+    /// On a linear joint.
+    Prismatic,
+    /// On a rotary joint.
+    Revolute,
+    /// On a frame.
+    Frame,
+    /// On what the instrument reads.
+    Measurement,
+}
+
+impl Seat {
+    /// Kind of the joint there.
+    pub fn joint(self) -> Option<JointKind> {
+        match self {
+            Seat::Prismatic => Some(JointKind::Prismatic),
+            Seat::Revolute => Some(JointKind::Revolute),
+            Seat::Frame | Seat::Measurement => None,
+        }
+    }
+}
+
+/// The other joint of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Partner {
+    /// Any other linear joint.
+    Prismatic,
+    /// Any other rotary joint.
+    Revolute,
+    /// Any other joint.
+    Joint,
+}
+
+/// Which side of the joint a deviation stands on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Pivot {
+    /// `M exp(error) exp(xi q)`: in the frame that stands still.
+    #[default]
+    Before,
+    /// `M exp(xi q) exp(error)`: in the frame that moves along.
+    After,
+}
+
+/// Sets of directions in se(3), in the frame of the place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Directions {
+    /// The joint's own twist: the error adds to its displacement.
+    Along,
+    /// The two translations across the joint's axis.
+    Across,
+    /// The translation along the joint's axis.
+    Slide,
+    /// The rotation about the joint's axis.
+    Turn,
+    /// The two rotations across the joint's axis.
+    Tilts,
+    /// All three translations.
+    Translations,
+    /// All three rotations.
+    Rotations,
+    /// Every length that the instrument reads, each for itself.
+    Readings,
+    /// The own twists of all joints at once, with one coefficient; features are then those of each joint.
+    EveryJoint,
+}
+
+/// A parameter that features depend on in a way that is not linear.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename = "parameter", deny_unknown_fields)]
+pub struct ParameterForm {
+    /// Name, as in `Parameter("name")`.
+    pub name: String,
+    /// Its unit: `travel` (the joint's unit), `s`, `1/s`, `1`, or a product of such.
+    pub unit: String,
+    /// Range on linear joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub linear: Option<(f64, f64, String)>,
+    /// Range on rotary joints.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angular: Option<(f64, f64, String)>,
+    /// Range, whatever the place.
+    #[serde(default)]
+    pub range: Range,
+    /// Which values are tried.
+    pub grid: Grid,
+}
+
+/// Range of a parameter where it is no matter of the joint's kind.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum Range {
+    /// `linear` and `angular` say it.
+    #[default]
+    ByKind,
+    /// From, to, unit.
+    Between(f64, f64, String),
+    /// The own joint's travel seen.
+    Travel,
+    /// The time seen.
+    Time,
+}
+
+/// Which values of a parameter are tried. Neighbours must look alike: their columns correlate by 0.9 or more.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Grid {
+    /// Each this many times the one before.
+    Logarithmic(f64),
+    /// This many equal steps.
+    Parts(usize),
+    /// Whole numbers.
+    Whole,
+    /// Periods: one over them grows by this part of one over the travel (or time) seen.
+    Periods(f64),
+    /// Frequencies: they grow by this part of one over the longest recording.
+    Frequencies(f64),
+    /// Steps of this part of another parameter's value.
+    Within(String, f64),
+}
+
+/// Usual size of a deviation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename = "size", deny_unknown_fields)]
+pub struct Size {
+    /// Of translations, um.
+    pub um: f64,
+    /// Of rotations, urad.
+    pub urad: f64,
+}
+
+impl Default for Size {
+    fn default() -> Self {
+        Size { um: 10.0, urad: 50.0 }
+    }
+}
+
+/// A number that is reported.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename = "coefficient", deny_unknown_fields)]
+pub struct Output {
+    /// Its name; a list of numbers is named after its members.
+    #[serde(default)]
+    pub name: String,
+    /// What it is.
+    pub is: Meaning,
+    /// Its unit, which must be what the features make of it; `travel` is the joint's unit. Left out for lists.
+    #[serde(default)]
+    pub unit: String,
+    /// Unit for people, where it is not the usual one of its kind: `ppm`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shown: Option<String>,
+}
+
+/// How a reported number follows from the coefficients of the features (counted from 0) and from the parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Meaning {
+    /// The coefficient of a feature.
+    Coefficient(usize),
+    /// Its absolute value.
+    Magnitude(usize),
+    /// Of a pair of sine and cosine: half the largest extent of the ellipse that they make.
+    Amplitude(usize, usize),
+    /// Of a pair of sine and cosine: phase of the sine that they make, for the direction with the largest part, rad.
+    Phase(usize, usize),
+    /// A parameter.
+    Parameter(String),
+    /// A full turn over a parameter.
+    TurnOver(String),
+    /// One over a parameter.
+    Reciprocal(String),
+    /// The largest deviation over the recordings.
+    Peak,
+    /// The coefficients of a feature, named by direction: vx vy vz wx wy wz.
+    Components(usize),
+    /// All coefficients, named c0, c1 and so on by feature, with the direction where there are several.
+    Curve,
+}
+
+/// An effect that may be taken for this one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename = "look_alike", deny_unknown_fields)]
+pub struct LookAlike {
+    /// Its name.
+    pub effect: String,
+    /// The motion or test that tells them apart.
+    pub separate_by: String,
+}
+
+impl ParameterForm {
+    /// Its dimension at a place with this kind of joint.
+    pub fn dimension(&self, own: Option<JointKind>) -> Option<Dimension> {
+        Dimension::parse(&self.unit, own.map(Dimension::of_joint))
+    }
+
+    /// The range that the text gives for this kind of joint, SI; `None` where it is that of the recordings.
+    pub fn stated(&self, own: Option<JointKind>) -> Option<(f64, f64, Dimension)> {
+        let (from, to, symbol) = match (&self.range, own) {
+            (Range::Between(from, to, symbol), _) => (*from, *to, symbol),
+            (Range::ByKind, Some(JointKind::Prismatic)) => self.linear.as_ref().map(|(a, b, u)| (*a, *b, u))?,
+            (Range::ByKind, Some(JointKind::Revolute)) => self.angular.as_ref().map(|(a, b, u)| (*a, *b, u))?,
+            _ => return None,
+        };
+        match Unit::named(symbol) {
+            Some(unit) => Some((unit.to_si(from), unit.to_si(to), Dimension::of_quantity(unit.quantity))),
+            None => Dimension::parse(symbol, None).map(|dimension| (from, to, dimension)),
+        }
+    }
+}

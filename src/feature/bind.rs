@@ -1,0 +1,413 @@
+//! From an expression to a feature of one machine, and back.
+
+use super::Expression;
+use crate::machine::Machine;
+use crate::units::Unit;
+
+/// An expression bound to a machine, to a place on it and to the travel seen: a number for each sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feature {
+    pub(super) node: Node,
+    /// How many parts have history.
+    pub(super) memories: usize,
+}
+
+/// Joints are indices of dyads.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Node {
+    Number(f64),
+    Parameter(usize),
+    Joint(usize, Column),
+    Time(f64),
+    Channel(String),
+    Sum(Vec<Node>),
+    Product(Vec<Node>),
+    Quotient(Box<[Node; 2]>),
+    Power(Box<Node>, i8),
+    Function(Function, Box<Node>),
+    Chebyshev(u8, Box<Node>),
+    Between(Box<Node>, f64, f64),
+    Play { joint: usize, width: Box<Node>, memory: usize },
+    TakeUp { joint: usize, length: Box<Node>, memory: usize },
+    Lag { of: Box<Node>, time: Box<Node>, memory: usize },
+}
+
+/// A column of [`super::JointSamples`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Column {
+    Position,
+    Direction,
+    Velocity,
+    Acceleration,
+    SinceReversal,
+    Travelled,
+    Gravity,
+    Load,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Function {
+    Sin,
+    Cos,
+    Exp,
+    Abs,
+    Sign,
+    Positive,
+    Step,
+    Bump,
+}
+
+/// What an expression is bound to.
+#[derive(Clone, Debug)]
+pub struct Binding<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// Dyad of the own joint.
+    pub own: Option<usize>,
+    /// Dyad of the other joint of a pair.
+    pub partner: Option<usize>,
+    /// Range of every dyad's displacement over all recordings, m or rad.
+    pub travel: &'a [Option<(f64, f64)>],
+    /// First and last time over all recordings, s.
+    pub time: Option<(f64, f64)>,
+    /// Names of the parameters, in their order.
+    pub parameters: &'a [String],
+}
+
+/// What an expression refers to and is not there.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Unbound {
+    /// Own joint where there is none.
+    #[error("there is no joint at this place")]
+    NoJoint,
+    /// A joint that the machine does not have.
+    #[error("the machine has no joint \"{0}\"")]
+    UnknownJoint(String),
+    /// No range of travel is known.
+    #[error("the joint does not move")]
+    NoTravel,
+    /// No range of time is known.
+    #[error("the recordings have no time column `t`")]
+    NoTime,
+    /// A parameter that is not declared.
+    #[error("parameter \"{0}\" is not declared")]
+    Parameter(String),
+    /// A unit that is none.
+    #[error("\"{0}\" is no unit")]
+    Unit(String),
+}
+
+impl Feature {
+    /// Binds an expression.
+    ///
+    /// # Errors
+    /// What it refers to and is not there.
+    pub fn bind(expression: &Expression, binding: &Binding) -> Result<Self, Unbound> {
+        let mut memories = 0;
+        let node = bind(expression, binding, &mut memories)?;
+        Ok(Feature { node, memories })
+    }
+
+    fn of(node: Node) -> Self {
+        Feature { node, memories: 0 }
+    }
+
+    /// 1 everywhere.
+    pub fn one() -> Self {
+        Self::of(Node::Number(1.0))
+    }
+
+    /// Displacement of the joint of a dyad, m or rad.
+    pub fn position(dyad: usize) -> Self {
+        Self::of(Node::Joint(dyad, Column::Position))
+    }
+
+    /// Half the direction of travel of the joint of a dyad: ±½, so that its coefficient is the whole difference between directions.
+    pub fn half_direction(dyad: usize) -> Self {
+        Self::of(Node::Product(vec![Node::Number(0.5), Node::Joint(dyad, Column::Direction)]))
+    }
+
+    /// 1 where the joint of a dyad travels in this direction (-1 or 1), else 0.
+    pub fn travels(dyad: usize, direction: i8) -> Self {
+        let along =
+            Node::Product(vec![Node::Number(f64::from(direction)), Node::Joint(dyad, Column::Direction)]);
+        // A joint that never moves has direction 0 and travels in none.
+        let beyond = Node::Sum(vec![along, Node::Number(-0.5)]);
+        Self::of(Node::Function(Function::Step, Box::new(beyond)))
+    }
+
+    /// Product of features without history; with history, of which at most one factor may have some.
+    pub fn times(self, other: Feature) -> Self {
+        let memories = self.memories + other.memories;
+        let mut node = other.node;
+        renumber(&mut node, self.memories);
+        Feature { node: Node::Product(vec![self.node, node]), memories }
+    }
+
+    /// The feature with its parameters replaced by numbers, in SI.
+    ///
+    /// # Panics
+    /// If there are fewer numbers than parameters.
+    pub fn with(&self, parameters: &[f64]) -> Self {
+        let mut feature = self.clone();
+        replace(&mut feature.node, parameters);
+        feature
+    }
+
+    /// Whether its derivative by parameter `index` says how it changes: not where that parameter stands inside a step or sign.
+    pub fn is_smooth_in(&self, index: usize) -> bool {
+        smooth(&self.node, index)
+    }
+
+    /// Whether it takes part in this parameter at all.
+    pub fn takes(&self, index: usize) -> bool {
+        any(&self.node, &|n| *n == Node::Parameter(index))
+    }
+
+    /// Whether it needs the time of each sample.
+    pub fn needs_time(&self) -> bool {
+        any(&self.node, &|n| matches!(n, Node::Time(_) | Node::Lag { .. }))
+    }
+
+    /// Whether it needs velocities or accelerations.
+    pub fn needs_rates(&self) -> bool {
+        any(&self.node, &|n| matches!(n, Node::Joint(_, Column::Velocity | Column::Acceleration)))
+    }
+
+    /// Whether it needs gravity's columns.
+    pub fn needs_gravity(&self) -> bool {
+        any(&self.node, &|n| matches!(n, Node::Joint(_, Column::Gravity | Column::Load)))
+    }
+
+    /// Whether it depends on which way a joint has come.
+    pub fn needs_history(&self) -> bool {
+        let history = |n: &Node| {
+            matches!(n, Node::Joint(_, Column::Direction | Column::SinceReversal | Column::Travelled))
+                || matches!(n, Node::Play { .. } | Node::TakeUp { .. } | Node::Lag { .. })
+        };
+        any(&self.node, &history)
+    }
+
+    /// The extra channels that it needs.
+    pub fn channels(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        each(&self.node, &mut |n| {
+            if let Node::Channel(name) = n {
+                names.push(name.clone());
+            }
+        });
+        names.sort();
+        names.dedup();
+        names
+    }
+
+    /// Dyads of the joints that it depends on.
+    pub fn joints(&self) -> Vec<usize> {
+        let mut joints = Vec::new();
+        each(&self.node, &mut |n| match n {
+            Node::Joint(j, _) | Node::Play { joint: j, .. } | Node::TakeUp { joint: j, .. } => {
+                joints.push(*j)
+            }
+            _ => {}
+        });
+        joints.sort_unstable();
+        joints.dedup();
+        joints
+    }
+
+    /// The expression that binds to this feature on the same machine without knowing of any recording: what is stored in files.
+    pub fn to_expression(&self, machine: &Machine, parameters: &[String]) -> Expression {
+        express(&self.node, machine, parameters)
+    }
+}
+
+fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<Node, Unbound> {
+    use Expression as E;
+    let own = || b.own.ok_or(Unbound::NoJoint);
+    let column = |column| own().map(|j| Node::Joint(j, column));
+    let mut next = || {
+        *memories += 1;
+        *memories - 1
+    };
+    let function = |f, e: &Expression, m: &mut usize| Ok(Node::Function(f, Box::new(bind(e, b, m)?)));
+    let named = |name: &str| {
+        let found = b.machine.joints().find(|(_, joint)| joint.name == name);
+        found.map(|(j, _)| j).ok_or_else(|| Unbound::UnknownJoint(name.into()))
+    };
+    Ok(match expression {
+        E::Number(value) => Node::Number(*value),
+        E::Value(value, symbol) => {
+            Node::Number(Unit::named(symbol).ok_or_else(|| Unbound::Unit(symbol.clone()))?.to_si(*value))
+        }
+        E::Parameter(name) => {
+            let index = b.parameters.iter().position(|p| p == name);
+            Node::Parameter(index.ok_or_else(|| Unbound::Parameter(name.clone()))?)
+        }
+        E::Position => column(Column::Position)?,
+        E::Direction => column(Column::Direction)?,
+        E::Velocity => column(Column::Velocity)?,
+        E::Acceleration => column(Column::Acceleration)?,
+        E::SinceReversal => column(Column::SinceReversal)?,
+        E::Travelled => column(Column::Travelled)?,
+        E::Gravity => column(Column::Gravity)?,
+        E::Load => column(Column::Load)?,
+        E::Stroke => {
+            let j = own()?;
+            let (from, to) = b.travel[j].filter(|(from, to)| to > from).ok_or(Unbound::NoTravel)?;
+            Node::Between(Box::new(Node::Joint(j, Column::Position)), from, to)
+        }
+        E::Time => Node::Time(b.time.ok_or(Unbound::NoTime)?.0),
+        E::TimeSince(since) => Node::Time(*since),
+        E::Clock => {
+            let (from, to) = b.time.filter(|(from, to)| to > from).ok_or(Unbound::NoTime)?;
+            Node::Between(Box::new(Node::Time(from)), 0.0, to - from)
+        }
+        E::Channel(name) => Node::Channel(name.clone()),
+        E::Of(name, e) => bind(e, &Binding { own: Some(named(name)?), ..b.clone() }, memories)?,
+        E::Partner(e) => {
+            let own = Some(b.partner.ok_or(Unbound::NoJoint)?);
+            bind(e, &Binding { own, ..b.clone() }, memories)?
+        }
+        E::Sum(list) => Node::Sum(list.iter().map(|e| bind(e, b, memories)).collect::<Result<_, _>>()?),
+        E::Product(list) => {
+            Node::Product(list.iter().map(|e| bind(e, b, memories)).collect::<Result<_, _>>()?)
+        }
+        E::Difference(first, second) => {
+            let minus = Node::Product(vec![Node::Number(-1.0), bind(second, b, memories)?]);
+            Node::Sum(vec![bind(first, b, memories)?, minus])
+        }
+        E::Quotient(above, below) => {
+            Node::Quotient(Box::new([bind(above, b, memories)?, bind(below, b, memories)?]))
+        }
+        E::Power(e, n) => Node::Power(Box::new(bind(e, b, memories)?), *n),
+        E::Sin(e) => function(Function::Sin, e, memories)?,
+        E::Cos(e) => function(Function::Cos, e, memories)?,
+        E::Exp(e) => function(Function::Exp, e, memories)?,
+        E::Abs(e) => function(Function::Abs, e, memories)?,
+        E::Sign(e) => function(Function::Sign, e, memories)?,
+        E::Positive(e) => function(Function::Positive, e, memories)?,
+        E::Step(e) => function(Function::Step, e, memories)?,
+        E::Bump(e) => function(Function::Bump, e, memories)?,
+        E::Chebyshev(order, e) => Node::Chebyshev(*order, Box::new(bind(e, b, memories)?)),
+        E::Between(e, from, to) => Node::Between(Box::new(bind(e, b, memories)?), *from, *to),
+        E::Play(width) => {
+            let (joint, memory) = (own()?, next());
+            Node::Play { joint, width: Box::new(bind(width, b, memories)?), memory }
+        }
+        E::TakeUp(length) => {
+            let (joint, memory) = (own()?, next());
+            Node::TakeUp { joint, length: Box::new(bind(length, b, memories)?), memory }
+        }
+        E::Lag(of, time) => {
+            let memory = next();
+            let (of, time) = (Box::new(bind(of, b, memories)?), Box::new(bind(time, b, memories)?));
+            Node::Lag { of, time, memory }
+        }
+    })
+}
+
+fn parts(node: &Node) -> Vec<&Node> {
+    match node {
+        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(_) => {
+            Vec::new()
+        }
+        Node::Sum(list) | Node::Product(list) => list.iter().collect(),
+        Node::Quotient(pair) => pair.iter().collect(),
+        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) => vec![e],
+        Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],
+        Node::Lag { of, time, .. } => vec![of, time],
+    }
+}
+
+fn parts_mut(node: &mut Node) -> Vec<&mut Node> {
+    match node {
+        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(_) => {
+            Vec::new()
+        }
+        Node::Sum(list) | Node::Product(list) => list.iter_mut().collect(),
+        Node::Quotient(pair) => pair.iter_mut().collect(),
+        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) => vec![e],
+        Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],
+        Node::Lag { of, time, .. } => vec![of, time],
+    }
+}
+
+fn any(node: &Node, condition: &dyn Fn(&Node) -> bool) -> bool {
+    condition(node) || parts(node).into_iter().any(|part| any(part, condition))
+}
+
+fn each(node: &Node, look: &mut dyn FnMut(&Node)) {
+    look(node);
+    parts(node).into_iter().for_each(|part| each(part, look));
+}
+
+fn replace(node: &mut Node, parameters: &[f64]) {
+    if let Node::Parameter(index) = node {
+        *node = Node::Number(parameters[*index]);
+    }
+    parts_mut(node).into_iter().for_each(|part| replace(part, parameters));
+}
+
+fn renumber(node: &mut Node, by: usize) {
+    if let Node::Play { memory, .. } | Node::TakeUp { memory, .. } | Node::Lag { memory, .. } = node {
+        *memory += by;
+    }
+    parts_mut(node).into_iter().for_each(|part| renumber(part, by));
+}
+
+fn smooth(node: &Node, index: usize) -> bool {
+    let steps = matches!(node, Node::Function(Function::Step | Function::Sign, _));
+    let inside = steps && any(node, &|n| *n == Node::Parameter(index));
+    !inside && parts(node).into_iter().all(|part| smooth(part, index))
+}
+
+fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression {
+    use Expression as E;
+    let inner = |e: &Node| Box::new(express(e, machine, parameters));
+    let list = |nodes: &[Node]| nodes.iter().map(|e| express(e, machine, parameters)).collect();
+    let of = |j: usize, e: Expression| {
+        let name = machine.dyads()[j].joint.as_ref().map_or_else(String::new, |joint| joint.name.clone());
+        E::Of(name, Box::new(e))
+    };
+    match node {
+        Node::Number(value) => E::Number(*value),
+        Node::Parameter(index) => E::Parameter(parameters.get(*index).cloned().unwrap_or_default()),
+        Node::Joint(j, column) => of(
+            *j,
+            match column {
+                Column::Position => E::Position,
+                Column::Direction => E::Direction,
+                Column::Velocity => E::Velocity,
+                Column::Acceleration => E::Acceleration,
+                Column::SinceReversal => E::SinceReversal,
+                Column::Travelled => E::Travelled,
+                Column::Gravity => E::Gravity,
+                Column::Load => E::Load,
+            },
+        ),
+        Node::Time(since) => E::TimeSince(*since),
+        Node::Channel(name) => E::Channel(name.clone()),
+        Node::Sum(nodes) => E::Sum(list(nodes)),
+        Node::Product(nodes) => E::Product(list(nodes)),
+        Node::Quotient(pair) => E::Quotient(inner(&pair[0]), inner(&pair[1])),
+        Node::Power(e, n) => E::Power(inner(e), *n),
+        Node::Function(f, e) => {
+            let e = inner(e);
+            match f {
+                Function::Sin => E::Sin(e),
+                Function::Cos => E::Cos(e),
+                Function::Exp => E::Exp(e),
+                Function::Abs => E::Abs(e),
+                Function::Sign => E::Sign(e),
+                Function::Positive => E::Positive(e),
+                Function::Step => E::Step(e),
+                Function::Bump => E::Bump(e),
+            }
+        }
+        Node::Chebyshev(order, e) => E::Chebyshev(*order, inner(e)),
+        Node::Between(e, from, to) => E::Between(inner(e), *from, *to),
+        Node::Play { joint, width, .. } => of(*joint, E::Play(inner(width))),
+        Node::TakeUp { joint, length, .. } => of(*joint, E::TakeUp(inner(length))),
+        Node::Lag { of, time, .. } => E::Lag(inner(of), inner(time)),
+    }
+}

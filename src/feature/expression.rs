@@ -1,0 +1,122 @@
+//! The language in which features are written, as RON and as a value; `docs/effects.md` teaches it.
+
+use serde::{Deserialize, Serialize};
+
+/// What a deviation depends on, in words. An own joint is that of the place where the effect sits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Expression {
+    /// A pure number.
+    Number(f64),
+    /// A number with a unit of the borders, `Value(20, "degC")`.
+    Value(f64, String),
+    /// A parameter of the family, in SI.
+    Parameter(String),
+
+    /// Displacement of the own joint, m or rad.
+    Position,
+    /// Where the own joint stands within the travel seen, from -1 to 1.
+    Stroke,
+    /// Direction of travel or approach of the own joint, -1 or 1 (0 if it never moves).
+    Direction,
+    /// Velocity of the own joint.
+    Velocity,
+    /// Acceleration of the own joint.
+    Acceleration,
+    /// Distance of the own joint from its last reversal.
+    SinceReversal,
+    /// Path that the own joint has travelled since the first sample of the recording.
+    Travelled,
+    /// Torque (revolute) or force (prismatic) by gravity on the own joint of the masses beyond it; of 1 kg at every frame beyond where
+    /// the machine file states no mass.
+    Gravity,
+    /// The same of 1 kg at the end of the branch.
+    Load,
+    /// Time since the first sample of all, s.
+    Time,
+    /// Where the time stands within the time seen, from -1 to 1.
+    Clock,
+    /// An extra column of the recording, SI.
+    Channel(String),
+
+    /// An expression seen from another joint of the machine.
+    Of(String, Box<Expression>),
+    /// An expression seen from the other joint of a family that takes pairs.
+    Partner(Box<Expression>),
+
+    /// Sum.
+    Sum(Vec<Expression>),
+    /// First less second.
+    Difference(Box<Expression>, Box<Expression>),
+    /// Product.
+    Product(Vec<Expression>),
+    /// First over second.
+    Quotient(Box<Expression>, Box<Expression>),
+    /// To a whole power.
+    Power(Box<Expression>, i8),
+    /// Sine of an angle or a pure number.
+    Sin(Box<Expression>),
+    /// Cosine of an angle or a pure number.
+    Cos(Box<Expression>),
+    /// e to the power of a pure number.
+    Exp(Box<Expression>),
+    /// Absolute value.
+    Abs(Box<Expression>),
+    /// -1, 0 or 1.
+    Sign(Box<Expression>),
+    /// The value where it is positive, else 0.
+    Positive(Box<Expression>),
+    /// 1 where the value is 0 or more, else 0.
+    Step(Box<Expression>),
+    /// `exp(-u²/2)` of a pure number.
+    Bump(Box<Expression>),
+    /// Chebyshev polynomial of this order of a pure number, meant for -1 to 1.
+    Chebyshev(u8, Box<Expression>),
+    /// From -1 to 1 while the expression runs from one number to another, in SI.
+    Between(Box<Expression>, f64, f64),
+
+    /// Deviation of what hangs behind the own joint with play of this width (total).
+    Play(Box<Expression>),
+    /// Runs from its present value to the direction of travel, -1 or 1, as `1 - exp(-d/length)` of the path `d`.
+    TakeUp(Box<Expression>),
+    /// First, low-passed with the second as time constant.
+    Lag(Box<Expression>, Box<Expression>),
+    /// Time since this moment on the recordings' clock, s. What `Time` becomes in a calibrated file.
+    TimeSince(f64),
+}
+
+impl Expression {
+    /// The expressions that it is made of, in the order in which they are written, each with its index among the values in brackets.
+    pub fn parts(&self) -> Vec<(&Expression, String)> {
+        use Expression::*;
+        match self {
+            Sum(list) | Product(list) => {
+                list.iter().enumerate().map(|(i, e)| (e, format!("[0][{i}]"))).collect()
+            }
+            Difference(a, b) | Quotient(a, b) | Lag(a, b) => {
+                vec![(&**a, "[0]".into()), (&**b, "[1]".into())]
+            }
+            Of(_, e) | Chebyshev(_, e) => vec![(&**e, "[1]".into())],
+            Partner(e)
+            | Power(e, _)
+            | Sin(e)
+            | Cos(e)
+            | Exp(e)
+            | Abs(e)
+            | Sign(e)
+            | Positive(e)
+            | Step(e)
+            | Bump(e)
+            | Between(e, ..)
+            | Play(e)
+            | TakeUp(e) => vec![(&**e, "[0]".into())],
+            Number(_) | Value(..) | Parameter(_) | Position | Stroke | Direction | Velocity
+            | Acceleration | SinceReversal | Travelled | Gravity | Load | Time | Clock | Channel(_)
+            | TimeSince(_) => Vec::new(),
+        }
+    }
+
+    /// Whether this or any part fulfils a condition.
+    pub fn any(&self, condition: &dyn Fn(&Expression) -> bool) -> bool {
+        condition(self) || self.parts().iter().any(|(part, _)| part.any(condition))
+    }
+}

@@ -1,0 +1,382 @@
+//! What features see of a recording: columns of positions, history and rates, joint by joint.
+
+use std::collections::BTreeMap;
+
+use crate::chain::{Chain, Sweep};
+use crate::error::Result;
+use crate::lie::Vec3;
+use crate::machine::{Branch, Drive, JointKind, Machine};
+use crate::motion::{Axis, LOOK_AHEAD, Rates, stated};
+use crate::recording::{Chunk, Recording};
+
+/// Standard acceleration of gravity, m/s².
+const GRAVITY: f64 = 9.806_65;
+
+/// Consecutive samples of one recording as features see them. All columns have `len` numbers, SI.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// How many samples there are.
+    pub len: usize,
+    /// Whether these are the first of their recording; play and take-up begin anew there.
+    pub first: bool,
+    /// Time on the recordings' clock, s.
+    pub time: Option<Vec<f64>>,
+    /// Columns of each dyad's joint, machine order; `None` for a frame without joint.
+    pub joints: Vec<Option<JointSamples>>,
+    /// Extra channels by name.
+    pub channels: BTreeMap<String, Vec<f64>>,
+}
+
+/// Columns of one joint's displacement, couplings included.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointSamples {
+    /// Displacement, m or rad.
+    pub position: Vec<f64>,
+    /// Direction of travel or approach: -1, 1; 0 for a joint that never moves.
+    pub direction: Vec<f64>,
+    /// Distance from the last reversal, m or rad.
+    pub since_reversal: Vec<f64>,
+    /// Path since the first sample of the recording, m or rad.
+    pub travelled: Vec<f64>,
+    /// Velocity, m/s or rad/s; empty without time.
+    pub velocity: Vec<f64>,
+    /// Acceleration, m/s² or rad/s²; empty without time.
+    pub acceleration: Vec<f64>,
+    /// Torque (Nm) or force (N) by gravity of the masses beyond.
+    pub gravity: Vec<f64>,
+    /// The same of 1 kg at the end of the branch.
+    pub load: Vec<f64>,
+}
+
+impl Samples {
+    /// One of them alone.
+    pub(super) fn only(&self, k: usize) -> Samples {
+        let one = |column: &Vec<f64>| column.get(k).map_or_else(Vec::new, |x| vec![*x]);
+        let joint = |joint: &JointSamples| JointSamples {
+            position: one(&joint.position),
+            direction: one(&joint.direction),
+            since_reversal: one(&joint.since_reversal),
+            travelled: one(&joint.travelled),
+            velocity: one(&joint.velocity),
+            acceleration: one(&joint.acceleration),
+            gravity: one(&joint.gravity),
+            load: one(&joint.load),
+        };
+        Samples {
+            len: usize::from(k < self.len),
+            first: self.first && k == 0,
+            time: self.time.as_ref().map(one),
+            joints: self.joints.iter().map(|j| j.as_ref().map(joint)).collect(),
+            channels: self.channels.iter().map(|(name, column)| (name.clone(), one(column))).collect(),
+        }
+    }
+}
+
+/// Turns the chunks of one recording, in their order, into [`Samples`]. Memory does not grow with the recording: one chunk is
+/// held back, because rates look a few samples ahead.
+pub struct Follow<'a, I> {
+    machine: &'a Machine,
+    chunks: I,
+    history: History,
+    weights: Option<Weights>,
+    held: Option<Chunk>,
+    /// Times and displacements of the last samples before the one held.
+    before: Vec<(f64, Vec<f64>)>,
+    started: bool,
+    pause_after: f64,
+    channels: Vec<String>,
+    ended: bool,
+}
+
+/// Histories of all joints.
+struct History {
+    /// Dyad, drive, dead band (m or rad), direction of the first motion.
+    joints: Vec<(usize, Drive, f64, i8)>,
+    axes: Vec<Option<Axis>>,
+    travelled: Vec<f64>,
+    last: Vec<f64>,
+}
+
+impl History {
+    fn new(machine: &Machine, dead_bands: &[f64], first: &[i8]) -> Self {
+        let joints: Vec<_> = (machine.joints())
+            .map(|(j, _)| {
+                (j, machine.drive(j).expect("every joint has a drive").clone(), dead_bands[j], first[j])
+            })
+            .collect();
+        let count = joints.len();
+        History { joints, axes: vec![None; count], travelled: vec![0.0; count], last: vec![f64::NAN; count] }
+    }
+
+    fn advance(&mut self, chunk: &Chunk, k: usize, displacements: &[f64]) {
+        for (i, (j, drive, band, _)) in self.joints.iter().enumerate() {
+            let q = displacements[*j];
+            // A column of directions speaks of one command; of a joint that follows several it says nothing.
+            let stated = match drive.terms.as_slice() {
+                [(c, factor)] => stated(chunk, *c, k).map(|d| if *factor < 0.0 { -d } else { d }),
+                _ => None,
+            };
+            self.axes[i].get_or_insert_with(|| Axis::at(q)).advance(q, stated, *band);
+            if self.last[i].is_finite() {
+                self.travelled[i] += (q - self.last[i]).abs();
+            }
+            self.last[i] = q;
+        }
+    }
+
+    fn direction(&self, i: usize) -> i8 {
+        match &self.axes[i] {
+            Some(axis) if axis.direction != 0 => axis.direction,
+            _ => self.joints[i].3,
+        }
+    }
+
+    fn since_reversal(&self, i: usize, q: f64) -> f64 {
+        self.axes[i].map_or(0.0, |axis| (q - axis.turned_at).abs())
+    }
+}
+
+/// Directions of the first motion of every dyad's joint (0 where it never moves, and for frames without joint).
+pub fn first_directions(
+    machine: &Machine,
+    dead_bands: &[f64],
+    chunks: impl IntoIterator<Item = Result<Chunk>>,
+) -> Result<Vec<i8>> {
+    let mut first = vec![0; machine.dyads().len()];
+    let mut history = History::new(machine, dead_bands, &first);
+    let commands = machine.commands().len();
+    for chunk in chunks {
+        let chunk = chunk?;
+        for (k, q) in chunk.commands.chunks_exact(commands).enumerate() {
+            history.advance(&chunk, k, &machine.displacements(q));
+            for (i, (j, ..)) in history.joints.iter().enumerate() {
+                if first[*j] == 0 {
+                    first[*j] = history.direction(i);
+                }
+            }
+        }
+        if history.joints.iter().all(|(j, ..)| first[*j] != 0) {
+            break;
+        }
+    }
+    Ok(first)
+}
+
+/// What is the same for every chunk of a recording.
+#[derive(Clone, Debug)]
+pub struct FollowOptions {
+    /// Motion against the direction of travel that counts as a reversal only beyond this, m or rad, for each dyad.
+    pub dead_bands: Vec<f64>,
+    /// Directions of the first motion, from [`first_directions`].
+    pub first_directions: Vec<i8>,
+    /// A longer time between two samples is a pause, s.
+    pub pause_after: f64,
+    /// Direction of gravity in frame `w`, where the recording states one.
+    pub gravity_w: Option<Vec3<f64>>,
+    /// Names of the extra channels in the order of the chunks.
+    pub channels: Vec<String>,
+    /// Whether columns `gravity` and `load` are wanted.
+    pub with_gravity: bool,
+}
+
+/// The part of [`Follow`] that knows no chunks.
+struct Weights {
+    chain: Chain<f64>,
+    g_b: Vec3<f64>,
+    /// Mass and its place behind the joint, by dyad; stated and substitute.
+    masses: Vec<Vec<(usize, f64, Vec3<f64>)>>,
+}
+
+impl Weights {
+    fn new(machine: &Machine, gravity_w: Option<Vec3<f64>>) -> Self {
+        let chain = Chain::nominal(machine);
+        let home = chain.sweep(&vec![0.0; machine.commands().len()]);
+        let g_b = gravity_w.map_or(machine.gravity_b(), |g_w| home.b_from_w().rotation * g_w);
+        let dyads = machine.dyads();
+        let beyond = |j: usize| {
+            let end =
+                if machine.branch(j) == Branch::Workpiece { machine.workpiece_count() } else { dyads.len() };
+            let stated: Vec<_> = (j..end)
+                .filter_map(|k| dyads[k].mass.map(|m| (k, m.mass, m.centre)))
+                .filter(|m| m.1 > 0.0)
+                .collect();
+            match stated.is_empty() {
+                true => (j + 1..end).map(|k| (k, 1.0, Vec3([0.0; 3]))).collect(),
+                false => stated,
+            }
+        };
+        Weights { chain, g_b: g_b.times(GRAVITY), masses: (0..dyads.len()).map(beyond).collect() }
+    }
+
+    /// Torque or force on the joint of dyad `j`: of the masses beyond, and of 1 kg at the end of the branch.
+    fn on(&self, machine: &Machine, sweep: &Sweep<f64>, displacements: &[f64], j: usize) -> (f64, f64) {
+        let Some(joint) = &machine.dyads()[j].joint else { return (0.0, 0.0) };
+        let b_from_j = sweep.b_from_frame(j);
+        let n_b = b_from_j.rotation * joint.axis;
+        let moment = |mass: f64, p_b: Vec3<f64>| match joint.kind {
+            JointKind::Prismatic => mass * n_b.dot(self.g_b),
+            JointKind::Revolute => mass * n_b.dot((p_b - b_from_j.translation).cross(self.g_b)),
+        };
+        let place = |k: usize, centre: Vec3<f64>| {
+            let behind = match &machine.dyads()[k].joint {
+                Some(joint) => crate::lie::Pose::exp(joint.twist().times(displacements[k])).transform(centre),
+                None => centre,
+            };
+            sweep.b_from_frame(k).transform(behind)
+        };
+        let gravity = self.masses[j].iter().map(|(k, mass, centre)| moment(*mass, place(*k, *centre))).sum();
+        let end = match machine.branch(j) {
+            Branch::Workpiece => sweep.b_from_w(),
+            Branch::Tool => sweep.b_from_t(),
+        };
+        (gravity, moment(1.0, end.translation))
+    }
+}
+
+impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
+    /// Follows the chunks of one recording from its first sample on.
+    ///
+    /// # Panics
+    /// If the options do not have one entry per dyad.
+    pub fn new(machine: &'a Machine, chunks: I, options: &FollowOptions) -> Self {
+        let dyads = machine.dyads().len();
+        assert_eq!(
+            (options.dead_bands.len(), options.first_directions.len()),
+            (dyads, dyads),
+            "one entry per dyad"
+        );
+        Follow {
+            machine,
+            chunks,
+            history: History::new(machine, &options.dead_bands, &options.first_directions),
+            weights: options.with_gravity.then(|| Weights::new(machine, options.gravity_w)),
+            held: None,
+            before: Vec::new(),
+            started: false,
+            pause_after: options.pause_after,
+            channels: options.channels.clone(),
+            ended: false,
+        }
+    }
+
+    /// The columns beside `chunk`; `ahead` are the samples that follow it.
+    fn columns(&mut self, chunk: &Chunk, ahead: Option<&Chunk>) -> Samples {
+        let machine = self.machine;
+        let commands = machine.commands().len();
+        let mut joints: Vec<Option<JointSamples>> = vec![None; machine.dyads().len()];
+        for (j, ..) in &self.history.joints {
+            joints[*j] = Some(JointSamples::default());
+        }
+        let mut sweep = None;
+        let mut moved = Vec::with_capacity(chunk.len);
+        for (k, q) in chunk.commands.chunks_exact(commands).enumerate() {
+            let displacements = machine.displacements(q);
+            self.history.advance(chunk, k, &displacements);
+            for (i, (j, ..)) in self.history.joints.iter().enumerate() {
+                let Some(columns) = &mut joints[*j] else { continue };
+                columns.position.push(displacements[*j]);
+                columns.direction.push(f64::from(self.history.direction(i)));
+                columns.since_reversal.push(self.history.since_reversal(i, displacements[*j]));
+                columns.travelled.push(self.history.travelled[i]);
+            }
+            if let Some(weights) = &self.weights {
+                let sweep = sweep.get_or_insert_with(|| weights.chain.sweep(q));
+                weights.chain.sweep_into(q, sweep);
+                for (j, columns) in joints.iter_mut().enumerate() {
+                    let Some(columns) = columns else { continue };
+                    let (gravity, load) = weights.on(machine, sweep, &displacements, j);
+                    columns.gravity.push(gravity);
+                    columns.load.push(load);
+                }
+            }
+            moved.push(displacements);
+        }
+        if let Some(times) = &chunk.time {
+            self.rates(times, &moved, ahead, &mut joints);
+        }
+        let first = !self.started && chunk.len > 0;
+        self.started |= first;
+        let channels = self.channels.iter().cloned().zip(chunk.channels.iter().cloned()).collect();
+        Samples { len: chunk.len, first, time: chunk.time.clone(), joints, channels }
+    }
+
+    /// Velocities and accelerations, with what stands before and after the chunk.
+    fn rates(
+        &mut self,
+        times: &[f64],
+        moved: &[Vec<f64>],
+        ahead: Option<&Chunk>,
+        joints: &mut [Option<JointSamples>],
+    ) {
+        let commands = self.machine.commands().len();
+        let lead = self.before.len();
+        let mut all_times: Vec<f64> = self.before.iter().map(|(t, _)| *t).collect();
+        let mut rows: Vec<&[f64]> = self.before.iter().map(|(_, row)| row.as_slice()).collect();
+        all_times.extend(times);
+        rows.extend(moved.iter().map(Vec::as_slice));
+        let next: Vec<Vec<f64>> = ahead.map_or_else(Vec::new, |chunk| {
+            let rows = chunk.commands.chunks_exact(commands).take(LOOK_AHEAD);
+            rows.map(|q| self.machine.displacements(q)).collect()
+        });
+        if let Some(times) = ahead.and_then(|chunk| chunk.time.as_ref()) {
+            all_times.extend(times.iter().take(LOOK_AHEAD));
+            rows.extend(next.iter().map(Vec::as_slice));
+        }
+        let weights: Vec<Rates> =
+            (lead..lead + times.len()).map(|k| Rates::at(&all_times, k, self.pause_after)).collect();
+        for (j, columns) in joints.iter_mut().enumerate() {
+            let Some(columns) = columns else { continue };
+            let positions: Vec<f64> = rows.iter().map(|row| row[j]).collect();
+            (columns.velocity, columns.acceleration) = weights.iter().map(|w| w.of(&positions)).unzip();
+        }
+        let keep = moved.len().saturating_sub(LOOK_AHEAD);
+        let tail = times.iter().copied().zip(moved.iter().cloned()).skip(keep);
+        self.before.extend(tail);
+        let surplus = self.before.len().saturating_sub(LOOK_AHEAD);
+        self.before.drain(..surplus);
+    }
+}
+
+impl<I: Iterator<Item = Result<Chunk>>> Iterator for Follow<'_, I> {
+    type Item = Result<(Chunk, Samples)>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        while !self.ended || self.held.is_some() {
+            let next = match if self.ended { None } else { self.chunks.next() } {
+                Some(Err(error)) => {
+                    (self.ended, self.held) = (true, None);
+                    return Some(Err(error));
+                }
+                Some(Ok(chunk)) => Some(chunk),
+                None => {
+                    self.ended = true;
+                    None
+                }
+            };
+            if let Some(chunk) = self.held.take() {
+                let samples = self.columns(&chunk, next.as_ref());
+                self.held = next;
+                return Some(Ok((chunk, samples)));
+            }
+            self.held = next;
+        }
+        None
+    }
+}
+
+/// All samples of a recording, for those that fit into memory.
+///
+/// # Errors
+/// As [`Recording::chunks`].
+pub fn samples_of(recording: &Recording, machine: &Machine, dead_bands: &[f64]) -> Result<Vec<Samples>> {
+    let first = first_directions(machine, dead_bands, recording.chunks()?)?;
+    let options = FollowOptions {
+        dead_bands: dead_bands.to_vec(),
+        first_directions: first,
+        pause_after: recording.scan()?.pause_after.unwrap_or(f64::INFINITY),
+        gravity_w: recording.header().gravity_w,
+        channels: recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
+        with_gravity: true,
+    };
+    Follow::new(machine, recording.chunks()?, &options).map(|item| item.map(|(_, samples)| samples)).collect()
+}
