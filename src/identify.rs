@@ -12,6 +12,7 @@ mod loss;
 mod normal;
 mod solve;
 mod source;
+mod stretch;
 mod thin;
 mod unknowns;
 
@@ -25,6 +26,7 @@ pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
 pub use solve::{Solver, Stop};
 pub(crate) use source::channel;
+pub(crate) use stretch::{Beginning, Memories, Stretch, stretches};
 
 use serde::Serialize;
 
@@ -39,7 +41,7 @@ use crate::variation::{Variation, Varying};
 use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
-use source::{History, Sources};
+use source::Sources;
 use thin::Thin;
 use unknowns::{Block, Layout, Role, Unknowns};
 
@@ -98,12 +100,11 @@ pub fn calibrate_model(
     progress: &dyn Fn(&str),
 ) -> Result<(CalibratedMachine, Fit)> {
     let varying = &model.varying;
-    let history = History { needed: !varying.is_constant(), dead_bands: model.dead_bands.clone() };
-    let mut sources = Sources::new(recordings, machine, &history, progress)?;
+    let mut sources = Sources::new(recordings, machine, varying, &model.dead_bands, progress)?;
     if let Some(count) = model.samples {
         let directions = varying.directions.as_ref();
-        sources.pick(count, directions.map_or(1, |d| d.piece_count()), |samples, k| {
-            directions.map_or(0, |d| d.piece(samples.directions(k)))
+        sources.pick(count, directions.map_or(1, |d| d.piece_count()), |stretch, k| {
+            directions.map_or(0, |d| d.piece(stretch.directions(k)))
         })?;
     }
     enough_to_start(machine, &sources)?;
@@ -169,9 +170,8 @@ pub fn fit_setup(
 ) -> Result<CalibratedMachine> {
     let (machine, variation) = (calibrated.machine(), calibrated.variation());
     let varying = &variation.varying;
-    let dead_bands = variation.dead_bands.iter().map(|band| Some(*band)).collect();
-    let history = History { needed: !varying.is_constant(), dead_bands };
-    let sources = Sources::new(recordings, machine, &history, &|_| {})?;
+    let dead_bands: Vec<_> = variation.dead_bands.iter().map(|band| Some(*band)).collect();
+    let sources = Sources::new(recordings, machine, varying, &dead_bands, &|_| {})?;
     enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources, varying);
     let mut problem = Problem::new(machine, &sources, &layout, varying, |block| {
@@ -252,7 +252,7 @@ pub struct Reach {
 /// As [`calibrate`].
 pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
     let varying = Varying::default();
-    let sources = Sources::new(recordings, machine, &History::default(), &|_| {})?;
+    let sources = Sources::new(recordings, machine, &varying, &[], &|_| {})?;
     enough_to_start(machine, &sources)?;
     let layout = Layout::new(machine, &sources, &varying);
     let mut problem = Problem::new(machine, &sources, &layout, &varying, is_of_setup);

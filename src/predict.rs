@@ -6,11 +6,9 @@ use serde::Serialize;
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
-use crate::feature::Samples;
-use crate::identify::{Evaluator, Moment, Values, channel};
+use crate::identify::{Beginning, Evaluator, Memories, Moment, Stretch, Values, channel, stretches};
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
-use crate::motion::{FirstDirections, Motion, Tracker};
 use crate::recording::{Header, NominalLength, Recording, Role, ToolPoint};
 use crate::sensor::{Sensor, SensorState};
 use crate::units::Unit;
@@ -98,7 +96,24 @@ pub fn predict(
         coefficients: &variation.coefficients,
     };
     let evaluator = Evaluator::with(machine, &sensor, state, previous_from_w, &dh, values);
-    let mut tracker = tracker(calibrated, recording)?;
+    let varying = &variation.varying;
+    let dead_bands = &variation.dead_bands;
+    let beginning = if varying.is_constant() {
+        None
+    } else {
+        Some(Beginning::of(recording, machine, varying, dead_bands)?)
+    };
+    let pause_after = if varying.is_constant() { None } else { recording.scan()?.pause_after };
+    let mut memories = Memories::new(varying);
+    let mut path = Path::new(stretches(
+        recording,
+        machine,
+        varying,
+        dead_bands,
+        beginning.as_ref(),
+        pause_after,
+        &mut memories,
+    )?);
     let columns = measured_columns(recording);
     let failed = |e| Error::file(recording.path(), e);
     if let Some(out) = &mut out {
@@ -110,15 +125,13 @@ pub fn predict(
     let (commands, values) = (machine.commands().len(), recording.value_count());
     for block in recording.rows_with_text()? {
         let block = block?;
-        let motion = tracker.as_mut().map_or_else(Motion::default, |t| t.follow(&block.chunk));
-        let samples = Samples { chunk: &block.chunk, motion: &motion, commands };
         for row in block.rows() {
             let mut tail = ",".repeat(2 * columns.len());
             if let Some(k) = row.sample {
                 let q = &block.chunk.commands[k * commands..(k + 1) * commands];
                 let measured = &block.chunk.values[k * values..(k + 1) * values];
                 extrapolated += u64::from(calibrated.extrapolates(q));
-                let moment = if tracker.is_some() { Moment::At(&samples, k) } else { Moment::Still };
+                let moment = if varying.is_constant() { Moment::Still } else { path.next()? };
                 unseen += u64::from(!variation.has_seen(evaluator.piece(moment)));
                 let residuals = evaluator.residuals(q, measured, moment, &mut work, None);
                 let residuals = &residuals[..sensor.reading_count()];
@@ -161,19 +174,30 @@ fn is_revolute(machine: &Machine, dyad: usize) -> bool {
     machine.dyads()[dyad].joint.as_ref().is_some_and(|j| j.kind == JointKind::Revolute)
 }
 
-/// Follows the path where the model depends on its history.
-fn tracker(calibrated: &CalibratedMachine, recording: &Recording) -> Result<Option<Tracker>> {
-    let variation = calibrated.variation();
-    if variation.varying.is_constant() {
-        return Ok(None);
+/// A second pass beside the rows, sample by sample, where the model depends on the path.
+struct Path<'a> {
+    stretches: Box<dyn Iterator<Item = Result<Stretch>> + 'a>,
+    now: Option<Stretch>,
+    at: usize,
+}
+
+impl<'a> Path<'a> {
+    fn new(stretches: Box<dyn Iterator<Item = Result<Stretch>> + 'a>) -> Self {
+        Path { stretches, now: None, at: 0 }
     }
-    let mut first = FirstDirections::new(variation.dead_bands.clone());
-    for chunk in recording.chunks()? {
-        if first.look(&chunk?) {
-            break;
+
+    /// The next sample.
+    fn next(&mut self) -> Result<Moment<'_>> {
+        while self.now.as_ref().is_none_or(|stretch| self.at == stretch.chunk.len) {
+            match self.stretches.next().transpose()? {
+                Some(stretch) => (self.now, self.at) = (Some(stretch), 0),
+                // The file has grown shorter since the rows were read.
+                None => return Ok(Moment::Still),
+            }
         }
+        self.at += 1;
+        Ok(self.now.as_ref().map_or(Moment::Still, |stretch| Moment::At(stretch, self.at - 1)))
     }
-    Ok(Some(Tracker::new(variation.dead_bands.clone(), first.found())))
 }
 
 /// Frame `w` of the recording's set-up in the frame before it, and the deviations that go with it.

@@ -50,6 +50,11 @@ pub struct Varying {
 }
 
 impl Varying {
+    /// The feature of every part of every term, in their order.
+    pub fn features(&self) -> impl Iterator<Item = &Feature> {
+        self.terms.iter().flat_map(|term| term.parts.iter().map(|part| &part.feature))
+    }
+
     /// Whether the history of the path matters.
     pub fn is_constant(&self) -> bool {
         self.directions.is_none() && self.terms.is_empty()

@@ -220,19 +220,16 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
             let _ = writeln!(text, "{}", cells.join(","));
         }
         let recordings = open(&machine, &text);
+        let last = machine.joints().find(|(_, own)| own.name == names[names.len() - 1]).expect("a joint").0;
         let part = |slot, direction, feature| Term {
             parts: vec![Part { slot, direction, feature }],
             scale: 1e-4,
             prior: false,
         };
         let terms = vec![
-            part(Slot::Before(j), joint.twist(), Feature::HalfDirection(axes[0])),
-            part(
-                Slot::Carried(j),
-                behind,
-                Feature::Product(vec![Feature::Position(axes[0]), Feature::Position(axes[0])]),
-            ),
-            part(Slot::Reading(1), Twist::zero(0.0), Feature::Position(axes[axes.len() - 1])),
+            part(Slot::Before(j), joint.twist(), Feature::half_direction(j)),
+            part(Slot::Carried(j), behind, Feature::position(j).times(Feature::position(j))),
+            part(Slot::Reading(1), Twist::zero(0.0), Feature::position(last)),
         ];
         let model = Model {
             varying: Varying { directions: None, terms },

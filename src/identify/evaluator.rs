@@ -1,9 +1,9 @@
 //! Residuals and Jacobian rows of one sample.
 
 use super::source::Source;
+use super::stretch::Stretch;
 use super::unknowns::Unknowns;
 use crate::chain::{Chain, Sweep, deviation_jacobian};
-use crate::feature::Samples;
 use crate::lie::{Mat3, Pose, Twist, Wrench};
 use crate::machine::Machine;
 use crate::sensor::{MOST_READINGS, Sensor, SensorState};
@@ -51,7 +51,7 @@ pub(crate) enum Moment<'a> {
     /// No direction, no feature: constant deviations alone.
     Still,
     /// Sample `k`.
-    At(&'a Samples<'a>, usize),
+    At(&'a Stretch, usize),
 }
 
 impl<'a> Evaluator<'a> {
@@ -123,7 +123,7 @@ impl<'a> Evaluator<'a> {
     pub fn piece(&self, moment: Moment) -> usize {
         let still = self.pieces.len() / 2; // every direction 0
         match (self.directions, moment) {
-            (Some(directions), Moment::At(samples, k)) => directions.piece(samples.directions(k)),
+            (Some(directions), Moment::At(stretch, k)) => directions.piece(stretch.directions(k)),
             _ => still,
         }
     }
@@ -163,17 +163,18 @@ impl<'a> Evaluator<'a> {
     /// The machine at a moment: the sweep of `work`, and the totals of the deviations that change.
     pub fn move_to(&self, q: &[f64], moment: Moment, work: &mut Workspace) {
         let piece = &self.pieces[self.piece(moment)];
-        let Moment::At(samples, k) = moment else { return piece.chain.sweep_into(q, &mut work.sweep) };
+        let Moment::At(stretch, k) = moment else { return piece.chain.sweep_into(q, &mut work.sweep) };
         if self.terms.is_empty() {
             return piece.chain.sweep_into(q, &mut work.sweep);
         }
         work.before.copy_from_slice(&piece.dh);
         work.behind.fill(Twist::zero(0.0));
+        let mut columns = stretch.features.iter();
         for ((term, coefficient), features) in
             self.terms.iter().zip(self.coefficients).zip(&mut work.features)
         {
             for (part, feature) in term.parts.iter().zip(features) {
-                *feature = part.feature.at(samples, k);
+                *feature = columns.next().map_or(0.0, |column| column[k]);
                 let added = part.direction.times(coefficient * *feature);
                 match part.slot {
                     Slot::Before(j) => work.before[j] = work.before[j] + added,

@@ -455,20 +455,20 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let limits: Vec<f64> =
         sources.all.iter().map(|s| chance_limit(s.sensor.reading_count(), sources.samples())).collect();
-    let (commands, loss) = (machine.commands().len(), problem.loss);
+    let loss = problem.loss;
     let (mut outliers, mut all) = (0, Vec::new());
     sources.pass(
-        |index, samples| {
-            let chunk = samples.chunk;
+        |index, stretch| {
+            let chunk = &stretch.chunk;
             let (source, evaluator) = (&sources.all[index], &evaluators[index]);
             let sigmas = sigmas(source, machine, found.noise[index]);
             let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
             let mut work = evaluator.workspace();
             let (mut beyond, mut own) = (0, Vec::new());
             for k in 0..chunk.len {
-                let q = &chunk.commands[k * commands..(k + 1) * commands];
+                let q = stretch.q(k);
                 let measured = &chunk.values[k * width..(k + 1) * width];
-                let residuals = evaluator.residuals(q, measured, Moment::At(samples, k), &mut work, None);
+                let residuals = evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, None);
                 let e2 = standardised(&residuals[..count], &sigmas);
                 let (_, weight) = loss.at(e2);
                 beyond += u64::from(e2 > limits[index]);

@@ -79,22 +79,21 @@ impl Sizes {
 /// Residuals by piece under these unknowns, over the samples of the fit or those held out.
 pub(crate) fn judge(problem: &Problem, unknowns: &Unknowns, which: Which) -> Result<Vec<Sizes>> {
     let (machine, sources) = (problem.machine, problem.sources);
-    let commands = machine.commands().len();
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let pieces = problem.varying.directions.as_ref().map_or(1, |d| d.piece_count());
     let mut sums = vec![Sizes::default(); pieces];
     sources.pass_over(
         which,
-        |index, samples| {
+        |index, stretch| {
             let (source, evaluator) = (&sources.all[index], &evaluators[index]);
             let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
             let angular = source.quantity(machine, 0) == Quantity::Angle;
             let mut own = vec![Sizes::default(); pieces];
             let mut work = evaluator.workspace();
-            for k in 0..samples.chunk.len {
-                let q = &samples.chunk.commands[k * commands..(k + 1) * commands];
-                let measured = &samples.chunk.values[k * width..(k + 1) * width];
-                let moment = Moment::At(samples, k);
+            for k in 0..stretch.chunk.len {
+                let q = stretch.q(k);
+                let measured = &stretch.chunk.values[k * width..(k + 1) * width];
+                let moment = Moment::At(stretch, k);
                 let residuals = evaluator.residuals(q, measured, moment, &mut work, None);
                 let sizes = &mut own[evaluator.piece(moment)];
                 sizes.take(usize::from(count == 1 && angular), &residuals[..count.min(3)]);

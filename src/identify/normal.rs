@@ -7,12 +7,12 @@ use rand::rngs::StdRng;
 use super::evaluator::{EXTRAS, Evaluator, Moment};
 use super::loss::Loss;
 use super::source::{Source, Sources};
+use super::stretch::Stretch;
 use super::thin::Thin;
 use super::unknowns::{Layout, Role, Unknowns};
 use crate::chain::deviation_jacobian;
 use crate::check::random_command;
 use crate::error::Result;
-use crate::feature::Samples;
 use crate::lie::{Twist, Vec3, Wrench};
 use crate::machine::Machine;
 use crate::motion::Tracker;
@@ -160,9 +160,9 @@ pub(crate) fn accumulate(
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let mut sums: Vec<Option<Part>> = sources.all.iter().map(|_| None).collect();
     sources.pass(
-        |index, samples| {
+        |index, stretch| {
             let sigmas = sigmas(&sources.all[index], machine, noise[index]);
-            part(&evaluators[index], &sources.all[index], samples, &sigmas, loss)
+            part(&evaluators[index], &sources.all[index], stretch, &sigmas, loss)
         },
         |index, part| match &mut sums[index] {
             None => sums[index] = Some(part),
@@ -177,13 +177,13 @@ pub(crate) fn accumulate(
     Ok(normal)
 }
 
-fn part(evaluator: &Evaluator, source: &Source, samples: &Samples, sigmas: &[f64], loss: Loss) -> Part {
+fn part(evaluator: &Evaluator, source: &Source, stretch: &Stretch, sigmas: &[f64], loss: Loss) -> Part {
     let (count, width) = (source.sensor.reading_count(), evaluator.width());
-    let (chunk, commands) = (samples.chunk, samples.commands);
+    let chunk = &stretch.chunk;
     let values = source.recording.value_count();
     let piece_count = evaluator.piece_count();
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); piece_count];
-    (0..chunk.len).for_each(|k| members[evaluator.piece(Moment::At(samples, k))].push(k));
+    (0..chunk.len).for_each(|k| members[evaluator.piece(Moment::At(stretch, k))].push(k));
     let mut work = evaluator.workspace();
     let mut total = 0.0;
     let mut tally = Tally { samples: chunk.len as u64, ..Tally::default() };
@@ -192,11 +192,11 @@ fn part(evaluator: &Evaluator, source: &Source, samples: &Samples, sigmas: &[f64
         let mut rows = DMatrix::<f64>::zeros(width, members.len() * count);
         let mut whitened = DVector::<f64>::zeros(members.len() * count);
         for (slot, k) in members.iter().enumerate() {
-            let q = &chunk.commands[k * commands..(k + 1) * commands];
+            let q = stretch.q(*k);
             let measured = &chunk.values[k * values..(k + 1) * values];
             let own = &mut rows.as_mut_slice()[slot * count * width..(slot + 1) * count * width];
             let residuals =
-                evaluator.residuals(q, measured, Moment::At(samples, *k), &mut work, Some(&mut *own));
+                evaluator.residuals(q, measured, Moment::At(stretch, *k), &mut work, Some(&mut *own));
             let residuals = &residuals[..count];
             let (rho, weight) = loss.at(standardised(residuals, sigmas));
             total += count as f64 * rho;
@@ -374,9 +374,11 @@ pub(crate) fn matrix_in_general(
             ..Chunk::default()
         };
         let motion = Tracker::new(vec![0.0; commands], vec![1; commands]).follow(&chunk);
-        let samples = Samples { chunk: &chunk, motion: &motion, commands };
+        // What terms see in general is not asked.
+        let features = unknowns.varying.features().map(|_| vec![0.0; samples]).collect();
+        let stretch = Stretch { chunk, motion, features, commands };
         let sigmas = vec![1.0; source.sensor.reading_count()];
-        let part = part(&evaluator, source, &samples, &sigmas, Loss::Squares);
+        let part = part(&evaluator, source, &stretch, &sigmas, Loss::Squares);
         normal.take(part, index, &evaluator, layout, source, unknowns);
     }
     normal.matrix

@@ -4,14 +4,14 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
+use super::stretch::{Beginning, Memories, Stretch, stretches};
 use crate::error::Result;
-use crate::feature::Samples;
 use crate::lie::Vec3;
 use crate::machine::{JointKind, Machine};
-use crate::motion::{FirstDirections, Motion, Tracker};
-use crate::recording::{Chunk, Measurement, NominalLength, Recording, Summary, ToolPoint};
+use crate::recording::{Measurement, NominalLength, Recording, Summary, ToolPoint};
 use crate::sensor::Sensor;
 use crate::units::Quantity;
+use crate::variation::Varying;
 
 /// As many samples in all are kept in memory; larger sets are read again in every pass.
 const CACHED_SAMPLES: u64 = 2_000_000;
@@ -51,18 +51,11 @@ pub(crate) struct Source<'a> {
     pub zero: Known<f64>,
     /// Length that a relative distance refers to, m.
     pub length: Known<f64>,
-    cached: Option<Vec<Held>>,
-    /// Directions of the first motions, where history matters.
-    first: Option<Vec<i8>>,
+    cached: Option<Vec<Stretch>>,
+    /// How the path begins, where history matters.
+    beginning: Option<Beginning>,
     /// Lines of the samples that were picked for the fit; all of them if there was no choice.
     picked: Option<HashSet<u64>>,
-}
-
-/// Samples with their history.
-#[derive(Debug)]
-struct Held {
-    chunk: Chunk,
-    motion: Motion,
 }
 
 /// Which samples a pass is over.
@@ -75,9 +68,24 @@ pub(crate) enum Which {
 }
 
 impl Source<'_> {
-    /// At the start of the recording, where history matters.
-    fn tracker(&self, dead_bands: &[f64]) -> Option<Tracker> {
-        self.first.as_ref().map(|first| Tracker::new(dead_bands.to_vec(), first.clone()))
+    /// All samples in their order, read anew.
+    fn stretches<'b>(
+        &'b self,
+        machine: &'b Machine,
+        varying: &'b Varying,
+        dead_bands: &[f64],
+        memories: &'b mut Memories,
+    ) -> Result<Box<dyn Iterator<Item = Result<Stretch>> + 'b>> {
+        let pause_after = self.summary.pause_after;
+        stretches(
+            self.recording,
+            machine,
+            varying,
+            dead_bands,
+            self.beginning.as_ref(),
+            pause_after,
+            memories,
+        )
     }
 
     /// The quantity of reading `i`.
@@ -120,19 +128,10 @@ pub(crate) struct Sources<'a> {
     pub zeros: Vec<(usize, String)>,
     /// Set-up of each unknown length.
     pub lengths: Vec<usize>,
-    /// Commands of a row.
-    commands: usize,
+    machine: &'a Machine,
+    varying: &'a Varying,
     /// Motion against the direction of travel that counts as a reversal beyond this, by command, m or rad.
     pub dead_bands: Vec<f64>,
-}
-
-/// What of the path's history a model needs.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct History {
-    /// Whether any.
-    pub needed: bool,
-    /// Dead bands by command, m or rad, where they are given.
-    pub dead_bands: Vec<Option<f64>>,
 }
 
 /// Dead band over the range of a command, where none is given.
@@ -150,8 +149,9 @@ impl<'a> Sources<'a> {
     /// Scans every recording once (all its rows are checked here) and keeps the samples if they are few enough.
     pub fn new(
         recordings: &'a [Recording],
-        machine: &Machine,
-        history: &History,
+        machine: &'a Machine,
+        varying: &'a Varying,
+        dead_bands: &[Option<f64>],
         progress: &dyn Fn(&str),
     ) -> Result<Self> {
         let commands = machine.commands().len();
@@ -162,7 +162,8 @@ impl<'a> Sources<'a> {
             tool_points: Vec::new(),
             zeros: Vec::new(),
             lengths: Vec::new(),
-            commands,
+            machine,
+            varying,
             dead_bands: Vec::new(),
         };
         let mut samples = 0;
@@ -178,26 +179,21 @@ impl<'a> Sources<'a> {
                 let ranges = sources.all.iter().map(|s| s.summary.commands[c]);
                 let (low, high) =
                     ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)));
-                let given = history.dead_bands.get(c).copied().flatten();
+                let given = dead_bands.get(c).copied().flatten();
                 given.unwrap_or(DEAD_BAND * (high - low).max(0.0))
             })
             .collect();
-        if history.needed {
+        if !varying.is_constant() {
             for source in &mut sources.all {
-                let mut first = FirstDirections::new(sources.dead_bands.clone());
-                for chunk in source.recording.chunks()? {
-                    if first.look(&chunk?) {
-                        break;
-                    }
-                }
-                source.first = Some(first.found());
+                let beginning = Beginning::of(source.recording, machine, varying, &sources.dead_bands)?;
+                source.beginning = Some(beginning);
             }
         }
         if samples <= CACHED_SAMPLES {
+            let mut memories = Memories::new(varying);
             for source in &mut sources.all {
-                let mut tracker = source.tracker(&sources.dead_bands);
-                let held = source.recording.chunks()?.map(|chunk| chunk.map(|c| Held::new(c, &mut tracker)));
-                source.cached = Some(held.collect::<Result<_>>()?);
+                let stretches = source.stretches(machine, varying, &sources.dead_bands, &mut memories)?;
+                source.cached = Some(stretches.collect::<Result<_>>()?);
             }
         }
         Ok(sources)
@@ -209,20 +205,20 @@ impl<'a> Sources<'a> {
         &mut self,
         count: u64,
         pieces: usize,
-        piece: impl Fn(&Samples, usize) -> usize + Sync,
+        piece: impl Fn(&Stretch, usize) -> usize + Sync,
     ) -> Result<()> {
-        let of_chunk = |samples: &Samples| -> Vec<(usize, u64)> {
-            (0..samples.chunk.len).map(|k| (piece(samples, k), samples.chunk.lines[k])).collect()
+        let of_chunk = |stretch: &Stretch| -> Vec<(usize, u64)> {
+            (0..stretch.chunk.len).map(|k| (piece(stretch, k), stretch.chunk.lines[k])).collect()
         };
         let mut totals = vec![0u64; pieces];
         self.pass(
-            |_, samples| of_chunk(samples),
+            |_, stretch| of_chunk(stretch),
             |_, of| of.iter().for_each(|(piece, _)| totals[*piece] += 1),
         )?;
         let mut seen = vec![0u64; pieces];
         let mut picked: Vec<HashSet<u64>> = vec![HashSet::new(); self.all.len()];
         self.pass(
-            |_, samples| of_chunk(samples),
+            |_, stretch| of_chunk(stretch),
             |index, of| {
                 for (piece, line) in of {
                     // The sample at which the running number of picks rises by one.
@@ -276,7 +272,7 @@ impl<'a> Sources<'a> {
             zero,
             length,
             cached: None,
-            first: None,
+            beginning: None,
             picked: None,
         });
     }
@@ -300,7 +296,7 @@ impl<'a> Sources<'a> {
     /// same input gives the same sums whatever the number of cores.
     pub fn pass<T: Send>(
         &self,
-        work: impl Fn(usize, &Samples) -> T + Sync,
+        work: impl Fn(usize, &Stretch) -> T + Sync,
         merge: impl FnMut(usize, T),
     ) -> Result<()> {
         self.pass_over(Which::Fit, work, merge)
@@ -310,30 +306,28 @@ impl<'a> Sources<'a> {
     pub fn pass_over<T: Send>(
         &self,
         which: Which,
-        work: impl Fn(usize, &Samples) -> T + Sync,
+        work: impl Fn(usize, &Stretch) -> T + Sync,
         mut merge: impl FnMut(usize, T),
     ) -> Result<()> {
-        let commands = self.commands;
+        let mut memories = Memories::new(self.varying);
         for (index, source) in self.all.iter().enumerate() {
-            let on = |held: &Held| match (&source.picked, which) {
-                (None, Which::Fit) => Some(work(index, &held.samples(commands))),
+            let on = |stretch: &Stretch| match (&source.picked, which) {
+                (None, Which::Fit) => Some(work(index, stretch)),
                 (None, Which::HeldOut) => None,
                 (Some(picked), which) => {
-                    let chosen =
-                        held.chosen(commands, |line| picked.contains(&line) == (which == Which::Fit));
-                    (chosen.chunk.len > 0).then(|| work(index, &chosen.samples(commands)))
+                    let chosen = stretch.chosen(|line| picked.contains(&line) == (which == Which::Fit));
+                    (chosen.chunk.len > 0).then(|| work(index, &chosen))
                 }
             };
-            if let Some(chunks) = &source.cached {
-                let parts: Vec<Option<T>> = chunks.par_iter().map(on).collect();
+            if let Some(stretches) = &source.cached {
+                let parts: Vec<Option<T>> = stretches.par_iter().map(on).collect();
                 parts.into_iter().flatten().for_each(|part| merge(index, part));
                 continue;
             }
-            let mut tracker = source.tracker(&self.dead_bands);
-            let mut chunks =
-                source.recording.chunks()?.map(|chunk| chunk.map(|c| Held::new(c, &mut tracker)));
+            let mut stretches =
+                source.stretches(self.machine, self.varying, &self.dead_bands, &mut memories)?;
             loop {
-                let batch: Vec<Held> = chunks.by_ref().take(BATCH).collect::<Result<_>>()?;
+                let batch: Vec<Stretch> = stretches.by_ref().take(BATCH).collect::<Result<_>>()?;
                 if batch.is_empty() {
                     break;
                 }
@@ -342,24 +336,6 @@ impl<'a> Sources<'a> {
             }
         }
         Ok(())
-    }
-}
-
-impl Held {
-    /// A chunk with its history, if one is followed.
-    fn new(chunk: Chunk, tracker: &mut Option<Tracker>) -> Self {
-        let motion = tracker.as_mut().map_or_else(Motion::default, |t| t.follow(&chunk));
-        Held { chunk, motion }
-    }
-
-    fn samples(&self, commands: usize) -> Samples<'_> {
-        Samples { chunk: &self.chunk, motion: &self.motion, commands }
-    }
-
-    /// Only the samples on these lines.
-    fn chosen(&self, commands: usize, on: impl Fn(u64) -> bool) -> Held {
-        let kept: Vec<usize> = (0..self.chunk.len).filter(|k| on(self.chunk.lines[*k])).collect();
-        Held { chunk: self.chunk.chosen(&kept), motion: self.motion.chosen(commands, &kept) }
     }
 }
 

@@ -27,7 +27,7 @@ pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
     let mut all = Vec::new();
     // The chunks come in order, so the running number of a sample is known when they are merged.
     sources.pass(
-        |_, samples| (samples.chunk.commands.clone(), samples.chunk.values.clone(), samples.chunk.len),
+        |_, stretch| (stretch.chunk.commands.clone(), stretch.chunk.values.clone(), stretch.chunk.len),
         |index, (q, values, len)| {
             let source = &sources.all[index];
             let width = source.recording.value_count();

@@ -1,0 +1,139 @@
+//! Consecutive samples with all that a model may depend on.
+
+use crate::error::Result;
+use crate::feature::{Feature, Follow, FollowOptions, Memory, first_directions};
+use crate::machine::Machine;
+use crate::motion::{FirstDirections, Motion, Tracker};
+use crate::recording::{Chunk, Recording};
+use crate::variation::Varying;
+
+/// Samples, their directions of travel, and the values of all features.
+#[derive(Debug)]
+pub(crate) struct Stretch {
+    pub chunk: Chunk,
+    /// Empty where nothing depends on directions.
+    pub motion: Motion,
+    /// One column for each part of each term, in their order.
+    pub features: Vec<Vec<f64>>,
+    /// Commands of a row.
+    pub commands: usize,
+}
+
+impl Stretch {
+    /// Directions of travel of all commands at sample `k`.
+    #[inline]
+    pub fn directions(&self, k: usize) -> &[i8] {
+        &self.motion.directions[k * self.commands..(k + 1) * self.commands]
+    }
+
+    /// Commands at sample `k`, m or rad.
+    #[inline]
+    pub fn q(&self, k: usize) -> &[f64] {
+        &self.chunk.commands[k * self.commands..(k + 1) * self.commands]
+    }
+
+    /// Only the samples on these lines.
+    pub fn chosen(&self, on: impl Fn(u64) -> bool) -> Stretch {
+        let kept: Vec<usize> = (0..self.chunk.len).filter(|k| on(self.chunk.lines[*k])).collect();
+        let column = |column: &Vec<f64>| kept.iter().map(|k| column[*k]).collect();
+        Stretch {
+            chunk: self.chunk.chosen(&kept),
+            motion: self.motion.chosen(self.commands, &kept),
+            features: self.features.iter().map(column).collect(),
+            commands: self.commands,
+        }
+    }
+}
+
+/// How the path of one recording begins.
+#[derive(Clone, Debug)]
+pub(crate) struct Beginning {
+    /// Directions of the first motion by command.
+    commands: Vec<i8>,
+    /// The same by dyad; empty where there are no features.
+    dyads: Vec<i8>,
+}
+
+impl Beginning {
+    /// Looks into the recording until every joint has moved.
+    pub fn of(
+        recording: &Recording,
+        machine: &Machine,
+        varying: &Varying,
+        dead_bands: &[f64],
+    ) -> Result<Self> {
+        let mut first = FirstDirections::new(dead_bands.to_vec());
+        for chunk in recording.chunks()? {
+            if first.look(&chunk?) {
+                break;
+            }
+        }
+        let dyads = if varying.terms.is_empty() {
+            Vec::new()
+        } else {
+            first_directions(machine, &by_dyad(machine, dead_bands), recording.chunks()?)?
+        };
+        Ok(Beginning { commands: first.found(), dyads })
+    }
+}
+
+/// Dead bands of the joints of all dyads from those of the commands.
+pub(crate) fn by_dyad(machine: &Machine, dead_bands: &[f64]) -> Vec<f64> {
+    let band = |j: usize| {
+        let terms = machine.drive(j).map_or(&[][..], |drive| &drive.terms);
+        terms.iter().map(|(c, factor)| factor.abs() * dead_bands[*c]).fold(0.0, f64::max)
+    };
+    (0..machine.dyads().len()).map(band).collect()
+}
+
+/// What features remember from stretch to stretch, and from recording to recording.
+pub(crate) struct Memories(Vec<Memory<f64>>);
+
+impl Memories {
+    pub fn new(varying: &Varying) -> Self {
+        Memories(varying.features().map(Memory::new).collect())
+    }
+}
+
+/// The stretches of a recording in their order; where nothing varies, chunks alone.
+pub(crate) fn stretches<'a>(
+    recording: &'a Recording,
+    machine: &'a Machine,
+    varying: &'a Varying,
+    dead_bands: &[f64],
+    beginning: Option<&Beginning>,
+    pause_after: Option<f64>,
+    memories: &'a mut Memories,
+) -> Result<Box<dyn Iterator<Item = Result<Stretch>> + 'a>> {
+    let commands = machine.commands().len();
+    let chunks = recording.chunks()?;
+    let Some(beginning) = beginning else {
+        let plain = move |chunk| Stretch { chunk, motion: Motion::default(), features: Vec::new(), commands };
+        return Ok(Box::new(chunks.map(move |chunk| chunk.map(plain))));
+    };
+    let mut tracker = Tracker::new(dead_bands.to_vec(), beginning.commands.clone());
+    if varying.terms.is_empty() {
+        return Ok(Box::new(chunks.map(move |chunk| {
+            chunk.map(|chunk| {
+                let motion = tracker.follow(&chunk);
+                Stretch { chunk, motion, features: Vec::new(), commands }
+            })
+        })));
+    }
+    let options = FollowOptions {
+        dead_bands: by_dyad(machine, dead_bands),
+        first_directions: beginning.dyads.clone(),
+        pause_after: pause_after.unwrap_or(f64::INFINITY),
+        gravity_w: recording.header().gravity_w,
+        channels: recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
+        with_gravity: varying.features().any(Feature::needs_gravity),
+    };
+    Ok(Box::new(Follow::new(machine, chunks, &options).map(move |item| {
+        item.map(|(chunk, samples)| {
+            let features = (varying.features().zip(&mut memories.0))
+                .map(|(feature, memory)| feature.column(&samples, &[], 1.0, memory))
+                .collect();
+            Stretch { motion: tracker.follow(&chunk), chunk, features, commands }
+        })
+    })))
+}
