@@ -18,7 +18,7 @@ mod expression;
 mod samples;
 
 pub use bind::{Binding, Feature, Unbound};
-pub use check::{DimensionFault, dimension_of};
+pub use check::{DimensionFault, Scope, dimension_of};
 pub use dimension::Dimension;
 pub use evaluate::Memory;
 pub use expression::Expression;
