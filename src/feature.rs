@@ -15,6 +15,7 @@ mod check;
 mod dimension;
 mod evaluate;
 mod expression;
+mod formula;
 mod samples;
 
 pub use bind::{Binding, Feature, Unbound};

@@ -5,7 +5,9 @@ mod common;
 use std::collections::BTreeSet;
 
 use kincal::Machine;
-use kincal::effects::{Candidate, Identified, Library, Place, RecordingFacts, Slot, StoredEffect};
+use kincal::effects::{
+    Candidate, Grid, Identified, Library, Place, Range, RecordingFacts, Slot, StoredEffect,
+};
 use kincal::feature::{Samples, samples_of};
 use kincal::machine::JointKind;
 use kincal::recording::Recording;
@@ -158,7 +160,7 @@ fn every_family_is_finite_at_every_place_of_every_machine() {
             assert!(!skipped.reason.is_empty(), "{stem}: {}", skipped.effect);
         }
     }
-    // Only what takes eight hours cannot be tried on a recording of a few seconds.
+    // A recording of a few seconds is too short for what takes eight hours.
     let missing: Vec<&str> = library.names().into_iter().filter(|n| !seen.contains(*n)).collect();
     assert_eq!(missing, ["daily_drift"]);
 }
@@ -275,4 +277,91 @@ fn a_family_left_out_is_gone_and_an_unknown_one_is_told() {
     assert!(library.families().iter().all(|f| f.look_alikes.iter().all(|l| l.effect != "backlash")));
     let error = library.without("backlash").expect_err("it is gone");
     assert!(error.to_string().contains("backlash") && error.mend().contains("hysteresis"), "{error}");
+}
+
+/// Share of a column that others explain, as a multiple correlation; columns and others have no mean.
+fn correlation(column: &[f64], others: &[Vec<f64>]) -> f64 {
+    let n = others.len();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+    let gram = nalgebra::DMatrix::from_fn(n, n, |i, k| dot(&others[i], &others[k]));
+    let right = nalgebra::DVector::from_fn(n, |i, _| dot(column, &others[i]));
+    let fit = gram.clone().pseudo_inverse(1e-12 * gram.trace()).expect("a pseudo-inverse") * &right;
+    (fit.dot(&right) / dot(column, column)).max(0.0).sqrt()
+}
+
+fn centred(mut column: Vec<f64>) -> Vec<f64> {
+    let mean = column.iter().sum::<f64>() / column.len() as f64;
+    column.iter_mut().for_each(|x| *x -= mean);
+    column
+}
+
+#[test]
+fn neighbouring_points_of_every_grid_look_alike() {
+    let library = Library::standard();
+    let machine = common::machine("ac_table_tilting");
+    let (facts, samples) = prepared(&machine, 1500);
+    let mut judged = 0;
+    for candidate in &library.candidates(&machine, &facts).all {
+        let forms = &library.families()[candidate.family].parameters;
+        // Of a large grid, every hundredth pair or so.
+        let stride = 1 + candidate.grid.len() / 100;
+        for pair in candidate.grid.windows(2).step_by(stride) {
+            // Neighbours differ in one parameter; a step in the outer one of two is judged by the inner ones around it.
+            let differs: Vec<usize> = (0..forms.len()).filter(|i| pair[0][*i] != pair[1][*i]).collect();
+            let [i] = differs[..] else { continue };
+            // Whole numbers have nothing between them. A step close to either end of the time is like no other.
+            let (from, to) = candidate.parameters[i].range;
+            let margin = 0.05 * (to - from);
+            let at_an_end =
+                forms[i].range == Range::Time && (pair[0][i] < from + margin || pair[1][i] > to - margin);
+            if forms[i].grid == Grid::Whole || at_an_end {
+                continue;
+            }
+            let columns = |point: &[f64]| -> Vec<Vec<f64>> {
+                candidate.features.iter().map(|f| centred(f.over(&samples, point))).collect()
+            };
+            let (here, next) = (columns(&pair[0]), columns(&pair[1]));
+            // Features that may be left out are refinements of those that may not.
+            for (column, feature) in here.iter().zip(&candidate.features).take(candidate.least) {
+                let power: f64 = column.iter().map(|x| x * x).sum();
+                if power > 1e-9 && feature.takes(i) {
+                    let found = correlation(column, &next);
+                    assert!(found >= 0.9, "{}: {found:.3} between {pair:?}", candidate.effect);
+                    judged += 1;
+                }
+            }
+        }
+    }
+    assert!(judged > 1000, "{judged}");
+}
+
+#[test]
+#[ignore = "a measurement, for release builds: cargo test --release --test effects how_long -- --ignored --nocapture"]
+fn how_long_all_columns_take() {
+    let library = Library::standard();
+    let machine = common::machine("ac_table_tilting");
+    let (facts, samples) = prepared(&machine, 7000);
+    let start = std::time::Instant::now();
+    let candidates = library.candidates(&machine, &facts);
+    println!("{} candidates in {:?}", candidates.all.len(), start.elapsed());
+    let (mut columns, mut sum) = (0, 0.0);
+    let start = std::time::Instant::now();
+    let mut slowest = Vec::new();
+    for candidate in &candidates.all {
+        let before = std::time::Instant::now();
+        for point in &candidate.grid {
+            for feature in &candidate.features {
+                sum += feature.over(&samples, point)[100];
+                columns += 1;
+            }
+        }
+        slowest.push((before.elapsed(), candidate.effect.clone(), candidate.place, candidate.grid.len()));
+    }
+    println!("{columns} columns of 7000 samples in {:?} (sum {sum:.3})", start.elapsed());
+    slowest.sort_by_key(|s| std::cmp::Reverse(s.0));
+    slowest.iter().take(12).for_each(|s| println!("{s:?}"));
+    let start = std::time::Instant::now();
+    let plain: Vec<&Candidate> = candidates.all.iter().filter(|c| c.parameters.is_empty()).collect();
+    let sum: f64 = plain.iter().flat_map(|c| &c.features).map(|f| f.over(&samples, &[])[100]).sum();
+    println!("{} candidates without parameters in {:?} (sum {sum:.3})", plain.len(), start.elapsed());
 }

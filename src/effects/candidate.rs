@@ -231,6 +231,9 @@ fn candidate(
             ));
         }
     }
+    if family.needs_masses && !own.is_some_and(|j| has_masses(machine, j)) {
+        return Err("the machine file states no masses beyond the joint".into());
+    }
     let kind = |j: usize| machine.dyads()[j].joint.as_ref().map(|joint| joint.kind);
     let own_kind = own.and_then(kind);
     let travel = own.and_then(|j| facts.travel[j]);
@@ -332,6 +335,13 @@ fn candidate(
         least: family.least.unwrap_or(family.features.len()),
         often: family.often,
     })
+}
+
+/// Whether the joint of dyad `j` carries masses that the machine file states.
+fn has_masses(machine: &Machine, j: usize) -> bool {
+    let beyond =
+        machine.dyads().iter().enumerate().skip(j).filter(|(k, _)| machine.branch(*k) == machine.branch(j));
+    beyond.into_iter().any(|(_, dyad)| dyad.mass.is_some_and(|m| m.mass > 0.0))
 }
 
 /// The feature, if the recordings have all that it needs.

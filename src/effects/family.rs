@@ -46,6 +46,9 @@ pub struct Family {
     /// Tried only where the recordings last this long, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lasts: Option<f64>,
+    /// Tried only where the machine file states masses beyond the joint.
+    #[serde(default)]
+    pub needs_masses: bool,
     /// How often it is met, against 1 for backlash.
     pub often: f64,
     /// What is reported.
