@@ -23,6 +23,8 @@ pub(crate) const EXTENSIONS: Extensions =
 pub(crate) struct Document {
     file: PathBuf,
     text: String,
+    /// Where the form of such a file is taught.
+    guide: &'static str,
 }
 
 impl Document {
@@ -30,7 +32,7 @@ impl Document {
         let file = file.as_ref().to_path_buf();
         // Some editors begin a text with a byte order mark.
         let text = text.strip_prefix('\u{feff}').map(str::to_string).unwrap_or(text);
-        let document = Document { file, text };
+        let document = Document { file, text, guide: NOT_RON };
         if document.text.len() > MOST_BYTES {
             return Err(document.refuse(
                 Place::file(&document.file),
@@ -72,6 +74,12 @@ impl Document {
         Self::new(path, text)
     }
 
+    /// The same text with another hint for whoever does not know its form.
+    pub fn guided(mut self, guide: &'static str) -> Self {
+        self.guide = guide;
+        self
+    }
+
     fn refuse(&self, place: Place, message: String, mend: &str) -> Error {
         Error::Ron { place, message, mend: mend.into() }
     }
@@ -82,9 +90,9 @@ impl Document {
         options.from_str(&self.text).map_err(|e| {
             let start = e.span.start;
             let (message, mend) = match self.at_end(start.line, start.col, &e.code) {
-                true if self.text.trim().is_empty() => ("the file is empty".into(), NOT_RON.into()),
-                true => explain(&ron::Error::Eof),
-                false => explain(&e.code),
+                true if self.text.trim().is_empty() => ("the file is empty".into(), self.guide.into()),
+                true => explain(&ron::Error::Eof, self.guide),
+                false => explain(&e.code, self.guide),
             };
             Error::Ron { place: Place::at(&self.file, start.line, start.col), message, mend }
         })
@@ -120,7 +128,7 @@ impl Document {
 const NOT_RON: &str = "docs/machines.md shows the form of a machine file";
 
 /// What RON's reader says, in words that help, and the mend.
-fn explain(code: &ron::Error) -> (String, String) {
+fn explain(code: &ron::Error, guide: &str) -> (String, String) {
     let list = |names: &[&str]| names.join(", ");
     match code {
         ron::Error::NoSuchStructField { expected, found, .. } => {
@@ -172,7 +180,7 @@ fn explain(code: &ron::Error) -> (String, String) {
                 "" => "expected an opening bracket `(`".into(),
                 name => format!("expected `{name}` in brackets: (field: value, ...)"),
             },
-            NOT_RON.into(),
+            guide.into(),
         ),
         ron::Error::ExpectedDifferentLength { expected, found } => {
             let plural = if *found == 1 { "" } else { "s" };
@@ -196,7 +204,7 @@ fn explain(code: &ron::Error) -> (String, String) {
         ron::Error::Eof => {
             ("the text ends too early".into(), "close every bracket and quotation mark".into())
         }
-        other => (other.to_string(), NOT_RON.into()),
+        other => (other.to_string(), guide.into()),
     }
 }
 

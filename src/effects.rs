@@ -20,6 +20,6 @@ pub use facts::RecordingFacts;
 pub use family::{
     Directions, Family, Grid, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat, Size,
 };
-pub use identified::{Identified, SizeOf, StoredEffect, StoredPart};
+pub use identified::{BoundPart, Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
 pub use library::{Library, LibraryFault};
 pub use quantity::in_words;

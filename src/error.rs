@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::effects::LibraryFault;
 use crate::machine::MachineFault;
 use crate::nc::NcFault;
 use crate::recording::RecordingFault;
@@ -74,6 +75,14 @@ pub enum Error {
         /// What is wrong.
         fault: Box<NcFault>,
     },
+    /// A library of effects that cannot stand.
+    #[error("{place}: {fault}")]
+    Effects {
+        /// Where in the file.
+        place: Place,
+        /// What is wrong.
+        fault: LibraryFault,
+    },
     /// A text in RON that cannot be read at all.
     #[error("{place}: {message}")]
     Ron {
@@ -109,6 +118,7 @@ impl Error {
             Error::Machine { fault, .. } => fault.mend(),
             Error::Recording { fault, .. } => fault.mend(),
             Error::Nc { fault, .. } => fault.mend(),
+            Error::Effects { fault, .. } => fault.mend.clone(),
             Error::Ron { mend, .. } | Error::Undetermined { mend, .. } => mend.clone(),
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
@@ -123,6 +133,7 @@ impl Error {
             Error::Machine { place, .. }
             | Error::Recording { place, .. }
             | Error::Nc { place, .. }
+            | Error::Effects { place, .. }
             | Error::Ron { place, .. } => Some(place),
             Error::File { .. } | Error::Undetermined { .. } => None,
         }

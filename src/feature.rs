@@ -15,10 +15,11 @@ mod check;
 mod dimension;
 mod evaluate;
 mod expression;
+mod formula;
 mod samples;
 
 pub use bind::{Binding, Feature, Unbound};
-pub use check::{DimensionFault, dimension_of};
+pub use check::{DimensionFault, Scope, dimension_of};
 pub use dimension::Dimension;
 pub use evaluate::Memory;
 pub use expression::Expression;

@@ -25,6 +25,8 @@
 //! | [`sensor`] | what instruments read, and how that depends on every unknown |
 //! | [`check`] | every Jacobian against forward-mode autodiff |
 //! | [`recording`] | CSV recordings, streamed |
+//! | [`motion`], [`feature`] | the history of a path; what a deviation depends on
+//! | [`effects`] | the physics that a kinematic model leaves out, as data
 //! | [`nc`] | NC programs: blocks, words, modal state; written back byte for byte |
 //! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
 //! | [`location`] | the same geometry as ISO 230-1 location errors |
@@ -73,6 +75,7 @@ pub mod check;
 pub mod demo;
 pub mod describe;
 mod document;
+pub mod effects;
 pub mod error;
 pub mod feature;
 pub mod identify;

@@ -43,6 +43,12 @@ pub struct Family {
     /// Size of the deviation, root mean square, that is usual on machines in use.
     #[serde(default)]
     pub size: Size,
+    /// Tried only where the recordings last this long, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lasts: Option<f64>,
+    /// Tried only where the machine file states masses beyond the joint.
+    #[serde(default)]
+    pub needs_masses: bool,
     /// How often it is met, against 1 for backlash.
     pub often: f64,
     /// What is reported.
@@ -214,7 +220,7 @@ pub struct Output {
 /// How a reported number follows from the coefficients of the features (counted from 0) and from the parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Meaning {
-    /// The coefficient of a feature.
+    /// The coefficient of a feature; of several directions the root of the sum of squares.
     Coefficient(usize),
     /// Its absolute value.
     Magnitude(usize),
@@ -228,6 +234,8 @@ pub enum Meaning {
     TurnOver(String),
     /// One over a parameter.
     Reciprocal(String),
+    /// A number that is the same for all, pure.
+    Constant(f64),
     /// The largest deviation over the recordings.
     Peak,
     /// The coefficients of a feature, named by direction: vx vy vz wx wy wz.
@@ -256,8 +264,12 @@ impl ParameterForm {
     pub fn stated(&self, own: Option<JointKind>) -> Option<(f64, f64, Dimension)> {
         let (from, to, symbol) = match (&self.range, own) {
             (Range::Between(from, to, symbol), _) => (*from, *to, symbol),
-            (Range::ByKind, Some(JointKind::Prismatic)) => self.linear.as_ref().map(|(a, b, u)| (*a, *b, u))?,
-            (Range::ByKind, Some(JointKind::Revolute)) => self.angular.as_ref().map(|(a, b, u)| (*a, *b, u))?,
+            (Range::ByKind, Some(JointKind::Prismatic)) => {
+                self.linear.as_ref().map(|(a, b, u)| (*a, *b, u))?
+            }
+            (Range::ByKind, Some(JointKind::Revolute)) => {
+                self.angular.as_ref().map(|(a, b, u)| (*a, *b, u))?
+            }
             _ => return None,
         };
         match Unit::named(symbol) {

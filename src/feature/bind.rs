@@ -19,7 +19,8 @@ pub(super) enum Node {
     Parameter(usize),
     Joint(usize, Column),
     Time(f64),
-    Channel(String),
+    /// Name and unit.
+    Channel(String, String),
     Sum(Vec<Node>),
     Product(Vec<Node>),
     Quotient(Box<[Node; 2]>),
@@ -27,9 +28,21 @@ pub(super) enum Node {
     Function(Function, Box<Node>),
     Chebyshev(u8, Box<Node>),
     Between(Box<Node>, f64, f64),
-    Play { joint: usize, width: Box<Node>, memory: usize },
-    TakeUp { joint: usize, length: Box<Node>, memory: usize },
-    Lag { of: Box<Node>, time: Box<Node>, memory: usize },
+    Play {
+        joint: usize,
+        width: Box<Node>,
+        memory: usize,
+    },
+    TakeUp {
+        joint: usize,
+        length: Box<Node>,
+        memory: usize,
+    },
+    Lag {
+        of: Box<Node>,
+        time: Box<Node>,
+        memory: usize,
+    },
 }
 
 /// A column of [`super::JointSamples`].
@@ -83,6 +96,9 @@ pub enum Unbound {
     /// A joint that the machine does not have.
     #[error("the machine has no joint \"{0}\"")]
     UnknownJoint(String),
+    /// A frame that the machine does not have.
+    #[error("the machine has no frame \"{0}\"")]
+    UnknownFrame(String),
     /// No range of travel is known.
     #[error("the joint does not move")]
     NoTravel,
@@ -188,12 +204,12 @@ impl Feature {
         any(&self.node, &history)
     }
 
-    /// The extra channels that it needs.
-    pub fn channels(&self) -> Vec<String> {
+    /// The extra channels that it needs, by name and unit.
+    pub fn channels(&self) -> Vec<(String, String)> {
         let mut names = Vec::new();
         each(&self.node, &mut |n| {
-            if let Node::Channel(name) = n {
-                names.push(name.clone());
+            if let Node::Channel(name, unit) = n {
+                names.push((name.clone(), unit.clone()));
             }
         });
         names.sort();
@@ -262,7 +278,13 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
             let (from, to) = b.time.filter(|(from, to)| to > from).ok_or(Unbound::NoTime)?;
             Node::Between(Box::new(Node::Time(from)), 0.0, to - from)
         }
-        E::Channel(name) => Node::Channel(name.clone()),
+        E::Channel(name, unit) => {
+            let joint = b.own.and_then(|j| b.machine.dyads()[j].joint.as_ref());
+            if name.contains("{at}") && joint.is_none() {
+                return Err(Unbound::NoJoint);
+            }
+            Node::Channel(name.replace("{at}", joint.map_or("", |joint| &joint.name)), unit.clone())
+        }
         E::Of(name, e) => bind(e, &Binding { own: Some(named(name)?), ..b.clone() }, memories)?,
         E::Partner(e) => {
             let own = Some(b.partner.ok_or(Unbound::NoJoint)?);
@@ -282,6 +304,7 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
         E::Power(e, n) => Node::Power(Box::new(bind(e, b, memories)?), *n),
         E::Sin(e) => function(Function::Sin, e, memories)?,
         E::Cos(e) => function(Function::Cos, e, memories)?,
+        E::Turns(e) => Node::Product(vec![Node::Number(std::f64::consts::TAU), bind(e, b, memories)?]),
         E::Exp(e) => function(Function::Exp, e, memories)?,
         E::Abs(e) => function(Function::Abs, e, memories)?,
         E::Sign(e) => function(Function::Sign, e, memories)?,
@@ -308,7 +331,7 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
 
 fn parts(node: &Node) -> Vec<&Node> {
     match node {
-        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(_) => {
+        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(..) => {
             Vec::new()
         }
         Node::Sum(list) | Node::Product(list) => list.iter().collect(),
@@ -321,7 +344,7 @@ fn parts(node: &Node) -> Vec<&Node> {
 
 fn parts_mut(node: &mut Node) -> Vec<&mut Node> {
     match node {
-        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(_) => {
+        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(..) => {
             Vec::new()
         }
         Node::Sum(list) | Node::Product(list) => list.iter_mut().collect(),
@@ -386,7 +409,7 @@ fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression 
             },
         ),
         Node::Time(since) => E::TimeSince(*since),
-        Node::Channel(name) => E::Channel(name.clone()),
+        Node::Channel(name, unit) => E::Channel(name.clone(), unit.clone()),
         Node::Sum(nodes) => E::Sum(list(nodes)),
         Node::Product(nodes) => E::Product(list(nodes)),
         Node::Quotient(pair) => E::Quotient(inner(&pair[0]), inner(&pair[1])),

@@ -2,7 +2,7 @@
 
 use super::{Dimension, Expression};
 use crate::machine::JointKind;
-use crate::units::{Quantity, Unit};
+use crate::units::Unit;
 
 /// Why an expression has no dimension, and where in it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -27,8 +27,6 @@ pub struct Scope<'a> {
     pub named: &'a dyn Fn(&str) -> Option<JointKind>,
     /// Dimensions of the family's parameters.
     pub parameter: &'a dyn Fn(&str) -> Option<Dimension>,
-    /// Quantities of extra channels; `None` where that is not known, so that any will do.
-    pub channel: &'a dyn Fn(&str) -> Option<Quantity>,
 }
 
 /// The dimension of an expression, `docs/effects.md` (42).
@@ -76,7 +74,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
     };
     match expression {
         Number(_) | Clock => Ok(Dimension::ONE),
-        Value(_, symbol) => match Unit::named(symbol) {
+        Value(_, symbol) | Channel(_, symbol) => match Unit::named(symbol) {
             Some(unit) => Ok(Dimension::of_quantity(unit.quantity)),
             None => Err(fault(format!("\"{symbol}\" is no unit"), "write a unit such as mm, deg, s, degC")),
         },
@@ -92,7 +90,6 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
             JointKind::Revolute => Dimension::FORCE.times(Dimension::LENGTH),
         }),
         Time | TimeSince(_) => Ok(Dimension::TIME),
-        Channel(name) => Ok((scope.channel)(name).map_or(Dimension::ONE, Dimension::of_quantity)),
         Of(name, e) => {
             let kind = (scope.named)(name).ok_or_else(|| {
                 fault(format!("joint \"{name}\" is not one of the machine's"), "name a joint of the machine")
@@ -152,6 +149,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
             f.path = "[0]".into();
             Err(f)
         }
+        Turns(e) => pure(e, "[0]", "Turns").map(|_| Dimension::ANGLE),
         Exp(e) => pure(e, "[0]", "Exp"),
         Bump(e) => pure(e, "[0]", "Bump"),
         Chebyshev(order, e) => {
@@ -164,7 +162,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
         Sign(e) | Step(e) => part(e, "[0]").map(|_| Dimension::ONE),
         Between(e, from, to) => {
             part(e, "[0]")?;
-            if !(to > from) {
+            if to.partial_cmp(from) != Some(std::cmp::Ordering::Greater) {
                 return Err(fault(
                     format!("Between runs from {from} to {to}"),
                     "write the smaller number first",

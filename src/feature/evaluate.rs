@@ -181,7 +181,7 @@ impl<S: Scalar> Pass<'_, S> {
                 let time = self.samples.time.as_deref().unwrap_or(&[]);
                 self.lifted(time).map(|t| t.offset(-since))
             }
-            Node::Channel(name) => {
+            Node::Channel(name, _) => {
                 self.lifted(self.samples.channels.get(name).map_or(&[][..], Vec::as_slice))
             }
             Node::Sum(list) => self.fold(list, 0.0, |a, b| a + b),

@@ -35,8 +35,8 @@ pub enum Expression {
     Time,
     /// Where the time stands within the time seen, from -1 to 1.
     Clock,
-    /// An extra column of the recording, SI.
-    Channel(String),
+    /// An extra column of the recording by name and unit, `Channel("temperature", "degC")`; in SI, whatever that unit.
+    Channel(String, String),
 
     /// An expression seen from another joint of the machine.
     Of(String, Box<Expression>),
@@ -57,6 +57,8 @@ pub enum Expression {
     Sin(Box<Expression>),
     /// Cosine of an angle or a pure number.
     Cos(Box<Expression>),
+    /// A pure number of turns as an angle.
+    Turns(Box<Expression>),
     /// e to the power of a pure number.
     Exp(Box<Expression>),
     /// Absolute value.
@@ -99,6 +101,7 @@ impl Expression {
             Partner(e)
             | Power(e, _)
             | Sin(e)
+            | Turns(e)
             | Cos(e)
             | Exp(e)
             | Abs(e)
@@ -110,7 +113,7 @@ impl Expression {
             | Play(e)
             | TakeUp(e) => vec![(&**e, "[0]".into())],
             Number(_) | Value(..) | Parameter(_) | Position | Stroke | Direction | Velocity
-            | Acceleration | SinceReversal | Travelled | Gravity | Load | Time | Clock | Channel(_)
+            | Acceleration | SinceReversal | Travelled | Gravity | Load | Time | Clock | Channel(..)
             | TimeSince(_) => Vec::new(),
         }
     }

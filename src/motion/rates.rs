@@ -32,7 +32,7 @@ impl Rates {
         let mut rates = Rates { from, count, velocity: [0.0; 5], acceleration: [0.0; 5] };
         // Times in units of the mean step, so that the matrix is well scaled.
         let step = (times[to] - times[from]) / (count.max(2) - 1) as f64;
-        if !(step > 0.0) {
+        if step.is_nan() || step <= 0.0 {
             return rates;
         }
         let u = |i: usize| (times[from + i] - times[k]) / step;

@@ -1,0 +1,154 @@
+//! What the recordings of a call have in them, as far as effects ask for it.
+
+use crate::error::Result;
+use crate::machine::{JointKind, Machine};
+use crate::recording::{Measurement, Recording};
+use crate::units::Quantity;
+
+/// Ranges, times and channels over all recordings of a call.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordingFacts {
+    /// Range of every dyad's displacement, m or rad; `None` for frames without joint.
+    pub travel: Vec<Option<(f64, f64)>>,
+    /// Motion against the direction of travel that counts as a reversal only beyond this, m or rad, for each dyad.
+    pub dead_bands: Vec<f64>,
+    /// First and last time, s, if all recordings have one.
+    pub time: Option<(f64, f64)>,
+    /// Duration of the longest recording, s.
+    pub longest: f64,
+    /// Median time from a sample to the next in the recording where it is smallest, s.
+    pub step: Option<f64>,
+    /// Whether samples are settled positions, so that there are no velocities.
+    pub settled: bool,
+    /// Extra channels that all recordings have.
+    pub channels: Vec<(String, Quantity)>,
+    /// Quantities of the readings of a sample, of the recording that has most.
+    pub readings: Vec<Quantity>,
+}
+
+/// A joint that moves by less stands still, m or rad.
+const STANDSTILL: f64 = 1e-9;
+/// Share of the range of travel below which motion against the direction of travel is jitter.
+const JITTER: f64 = 1e-6;
+/// Samples are settled positions where the median step of the joint that moves most is above this share of its range.
+const SETTLED_STEP: f64 = 0.05;
+
+impl RecordingFacts {
+    /// Reads every recording once.
+    ///
+    /// # Errors
+    /// As [`Recording::chunks`].
+    pub fn of(machine: &Machine, recordings: &[Recording]) -> Result<Self> {
+        let dyads = machine.dyads().len();
+        let mut facts = RecordingFacts {
+            travel: vec![None; dyads],
+            dead_bands: vec![0.0; dyads],
+            time: None,
+            longest: 0.0,
+            step: None,
+            settled: false,
+            channels: Vec::new(),
+            readings: Vec::new(),
+        };
+        let mut all_timed = true;
+        for (i, recording) in recordings.iter().enumerate() {
+            all_timed &= recording.has_time();
+            facts.take(machine, recording)?;
+            let channels = recording.extra_channels().iter().map(|c| (c.name.clone(), c.unit.quantity));
+            match i {
+                0 => facts.channels = channels.collect(),
+                _ => {
+                    let here: Vec<_> = channels.collect();
+                    facts.channels.retain(|c| here.contains(c));
+                }
+            }
+            let readings = readings(machine, recording);
+            if readings.len() > facts.readings.len() {
+                facts.readings = readings;
+            }
+        }
+        if !all_timed {
+            (facts.time, facts.step, facts.longest) = (None, None, 0.0);
+        }
+        facts.dead_bands =
+            (facts.travel.iter()).map(|t| t.map_or(0.0, |(from, to)| JITTER * (to - from))).collect();
+        Ok(facts)
+    }
+
+    fn take(&mut self, machine: &Machine, recording: &Recording) -> Result<()> {
+        let commands = machine.commands().len();
+        let mut own: Vec<Option<(f64, f64)>> = vec![None; machine.dyads().len()];
+        let mut steps: Vec<(f64, Vec<f64>)> = Vec::new();
+        let mut span: Option<(f64, f64)> = None;
+        for chunk in recording.chunks()? {
+            let chunk = chunk?;
+            let mut last: Option<Vec<f64>> = None;
+            for (k, q) in chunk.commands.chunks_exact(commands).enumerate() {
+                let displacements = machine.displacements(q);
+                for (j, _) in machine.joints() {
+                    let q = displacements[j];
+                    let (from, to) = own[j].unwrap_or((q, q));
+                    own[j] = Some((from.min(q), to.max(q)));
+                }
+                // The first chunk says what the steps are like.
+                if steps.len() < 4096
+                    && let Some(last) = last.replace(displacements.clone())
+                {
+                    let times = chunk.time.as_ref().map_or(0.0, |t| t[k] - t[k - 1]);
+                    steps
+                        .push((times, displacements.iter().zip(&last).map(|(a, b)| (a - b).abs()).collect()));
+                }
+            }
+            if let (Some(first), Some(last)) =
+                (chunk.time.as_ref().and_then(|t| t.first()), chunk.time.as_ref().and_then(|t| t.last()))
+            {
+                let (from, to) = span.unwrap_or((*first, *last));
+                span = Some((from.min(*first), to.max(*last)));
+            }
+        }
+        if let Some((from, to)) = span {
+            self.longest = self.longest.max(to - from);
+            let (first, last) = self.time.unwrap_or((from, to));
+            self.time = Some((first.min(from), last.max(to)));
+            let step = median(steps.iter().map(|(t, _)| *t));
+            self.step = Some(self.step.map_or(step, |s| s.min(step)));
+        }
+        self.settled |=
+            recording.columns().iter().any(|c| matches!(c.role, crate::recording::Role::Direction(_)));
+        let moving = |j: usize| own[j].map(|(from, to)| to - from).filter(|range| *range > STANDSTILL);
+        let largest = (machine.joints())
+            .filter_map(|(j, _)| Some(median(steps.iter().map(|(_, s)| s[j])) / moving(j)?))
+            .fold(0.0, f64::max);
+        self.settled |= largest > SETTLED_STEP;
+        for (all, own) in self.travel.iter_mut().zip(own) {
+            *all = match (*all, own) {
+                (Some((a, b)), Some((c, d))) => Some((a.min(c), b.max(d))),
+                (all, own) => all.or(own),
+            };
+        }
+        Ok(())
+    }
+
+    /// Whether the joint of dyad `j` moves.
+    pub fn moves(&self, j: usize) -> bool {
+        self.travel[j].is_some_and(|(from, to)| to - from > STANDSTILL)
+    }
+}
+
+fn readings(machine: &Machine, recording: &Recording) -> Vec<Quantity> {
+    match recording.header().measurement {
+        Measurement::Position => vec![Quantity::Length; 3],
+        Measurement::Pose => [[Quantity::Length; 3], [Quantity::Angle; 3]].concat(),
+        Measurement::Joint { dyad } => {
+            let kind = machine.dyads()[dyad].joint.as_ref().map(|joint| joint.kind);
+            vec![if kind == Some(JointKind::Revolute) { Quantity::Angle } else { Quantity::Length }]
+        }
+        Measurement::Distance { .. } | Measurement::Displacement => vec![Quantity::Length],
+    }
+}
+
+fn median(numbers: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = numbers.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,118 @@
+//! Which values of a family's parameters are tried: fine enough that none is missed, `docs/effects.md` (48).
+
+use super::facts::RecordingFacts;
+use super::family::{Grid, ParameterForm, Range};
+use crate::feature::Dimension;
+use crate::machine::JointKind;
+
+/// More points than this are cut short, evenly: a grid that large is a mistake of the library.
+const MOST_POINTS: usize = 200_000;
+
+/// A parameter's range at one place, SI; the reason where there is none.
+pub(super) fn range(
+    form: &ParameterForm,
+    own: Option<JointKind>,
+    travel: Option<(f64, f64)>,
+    facts: &RecordingFacts,
+) -> Result<(f64, f64), String> {
+    match form.range {
+        Range::Travel => travel.ok_or_else(|| "the joint does not move".into()),
+        Range::Time => facts.time.ok_or_else(|| NO_TIME.into()).map(|(from, to)| (0.0, to - from)),
+        Range::ByKind | Range::Between(..) => {
+            let (from, to, dimension) = form.stated(own).ok_or("no range is given for this kind of place")?;
+            Ok(narrowed(form, dimension, (from, to), travel, facts))
+        }
+    }
+}
+
+pub(super) const NO_TIME: &str = "it needs time, and a recording has no column t";
+
+/// Lengths, angles and times beyond what was seen cannot be told apart there: the range ends at a few times that. What is faster
+/// than the samples follow each other cannot be seen either.
+fn narrowed(
+    form: &ParameterForm,
+    dimension: Dimension,
+    (from, to): (f64, f64),
+    travel: Option<(f64, f64)>,
+    facts: &RecordingFacts,
+) -> (f64, f64) {
+    let seen = travel.map(|(a, b)| b - a);
+    let to = match (&form.grid, seen) {
+        (Grid::Frequencies(_), _) => match facts.step.filter(|s| *s > 0.0) {
+            Some(step) => to.min(0.5 / step),
+            None => to,
+        },
+        (Grid::Logarithmic(_), Some(seen))
+            if dimension == Dimension::LENGTH || dimension == Dimension::ANGLE =>
+        {
+            to.min(seen)
+        }
+        (Grid::Periods(_), Some(seen)) if dimension != Dimension::TIME => to.min(seen),
+        _ => to,
+    };
+    (from.min(to), to)
+}
+
+/// Points of all parameters together; one point without numbers where there is no parameter.
+pub(super) fn points(
+    forms: &[ParameterForm],
+    ranges: &[(f64, f64)],
+    travel: Option<(f64, f64)>,
+    facts: &RecordingFacts,
+) -> Vec<Vec<f64>> {
+    let seen = travel.map_or(1.0, |(a, b)| b - a);
+    let names: Vec<&str> = forms.iter().map(|f| f.name.as_str()).collect();
+    // Parameters whose steps follow another one come after it, whatever the order in which they are written.
+    let mut order: Vec<usize> = (0..forms.len()).collect();
+    order.sort_by_key(|i| matches!(forms[*i].grid, Grid::Within(..)));
+    let mut points = vec![vec![f64::NAN; forms.len()]];
+    for i in order {
+        let (from, to) = ranges[i];
+        let mut finer = Vec::new();
+        for point in &points {
+            let values = match &forms[i].grid {
+                Grid::Logarithmic(ratio) => logarithmic(from, to, *ratio),
+                Grid::Parts(parts) => even(from, to, *parts),
+                Grid::Whole => (from.ceil() as i64..=to.floor() as i64).map(|n| n as f64).collect(),
+                Grid::Periods(part) => {
+                    let extent = if forms[i].unit == "s" { facts.longest } else { seen };
+                    let (most, least) = (1.0 / from, 1.0 / to);
+                    let parts = ((most - least) * extent / part).ceil().max(1.0) as usize;
+                    even(least, most, parts.min(MOST_POINTS)).into_iter().rev().map(f64::recip).collect()
+                }
+                Grid::Frequencies(part) => {
+                    let parts = ((to - from) * facts.longest.max(1e-9) / part).ceil().max(1.0) as usize;
+                    even(from, to, parts.min(MOST_POINTS))
+                }
+                Grid::Within(other, part) => {
+                    let width = names.iter().position(|n| n == other).map_or(to - from, |o| point[o]);
+                    let parts = ((to - from) / (part * width).abs().max(1e-12)).ceil().max(1.0) as usize;
+                    even(from, to, parts.min(MOST_POINTS))
+                }
+            };
+            for value in values {
+                let mut point = point.clone();
+                point[i] = value;
+                finer.push(point);
+            }
+        }
+        points = finer;
+    }
+    points.truncate(MOST_POINTS);
+    points
+}
+
+fn even(from: f64, to: f64, parts: usize) -> Vec<f64> {
+    if to <= from {
+        return vec![from];
+    }
+    (0..=parts).map(|i| from + (to - from) * i as f64 / parts as f64).collect()
+}
+
+fn logarithmic(from: f64, to: f64, ratio: f64) -> Vec<f64> {
+    if to <= from || from <= 0.0 {
+        return vec![from.max(to)];
+    }
+    let parts = ((to / from).ln() / ratio.ln()).ceil().max(1.0);
+    (0..=parts as usize).map(|i| from * (to / from).powf(i as f64 / parts)).collect()
+}
