@@ -4,6 +4,7 @@ mod calibrate;
 mod check;
 mod demo;
 mod describe;
+mod diagnose;
 mod location;
 mod output;
 mod predict;
@@ -30,6 +31,8 @@ enum Command {
     Calibrate(calibrate::Args),
     /// What a calibrated machine says the instrument would read, sample by sample
     Predict(predict::Args),
+    /// Locates what a model leaves over, names the physics left out, and models it
+    Diagnose(diagnose::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
     Demo(demo::Args),
 }
@@ -52,6 +55,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Predict(args) => predict::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     match outcome {

@@ -8,6 +8,7 @@ mod evaluator;
 mod fit;
 mod information;
 mod judge;
+mod linear;
 mod loss;
 mod normal;
 mod solve;
@@ -23,6 +24,7 @@ pub use fit::{
 };
 pub use information::{Functional, Information};
 pub use judge::{Figures, PieceFit};
+pub(crate) use linear::{Linear, Span, linear};
 pub use loss::Loss;
 pub use solve::{Solver, Stop};
 pub(crate) use source::channel;

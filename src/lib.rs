@@ -74,6 +74,7 @@ pub mod chain;
 pub mod check;
 pub mod demo;
 pub mod describe;
+pub mod diagnose;
 mod document;
 pub mod effects;
 pub mod error;

@@ -170,6 +170,16 @@ impl Feature {
         feature
     }
 
+    /// What stands inside, if it is a sine or a cosine.
+    pub fn phase(&self) -> Option<Feature> {
+        match &self.node {
+            Node::Function(Function::Sin | Function::Cos, inner) if self.memories == 0 => {
+                Some(Feature::of((**inner).clone()))
+            }
+            _ => None,
+        }
+    }
+
     /// Whether its derivative by parameter `index` says how it changes: not where that parameter stands inside a step or sign.
     pub fn is_smooth_in(&self, index: usize) -> bool {
         smooth(&self.node, index)

@@ -49,6 +49,56 @@ pub struct JointSamples {
 }
 
 impl Samples {
+    /// These samples alone, by their index.
+    pub(crate) fn chosen(&self, kept: &[usize]) -> Samples {
+        self.mapped(kept.len(), |column| {
+            if column.is_empty() { Vec::new() } else { kept.iter().map(|k| column[*k]).collect() }
+        })
+    }
+
+    /// Puts the samples that follow behind these.
+    pub(crate) fn append(&mut self, next: Samples) {
+        self.len += next.len;
+        if let (Some(own), Some(next)) = (&mut self.time, next.time) {
+            own.extend(next);
+        }
+        for (own, next) in self.joints.iter_mut().zip(next.joints) {
+            let (Some(own), Some(next)) = (own, next) else { continue };
+            own.position.extend(next.position);
+            own.direction.extend(next.direction);
+            own.since_reversal.extend(next.since_reversal);
+            own.travelled.extend(next.travelled);
+            own.velocity.extend(next.velocity);
+            own.acceleration.extend(next.acceleration);
+            own.gravity.extend(next.gravity);
+            own.load.extend(next.load);
+        }
+        for (name, column) in next.channels {
+            self.channels.entry(name).or_default().extend(column);
+        }
+    }
+
+    /// Every column changed alike.
+    fn mapped(&self, len: usize, f: impl Fn(&Vec<f64>) -> Vec<f64>) -> Samples {
+        let joint = |joint: &JointSamples| JointSamples {
+            position: f(&joint.position),
+            direction: f(&joint.direction),
+            since_reversal: f(&joint.since_reversal),
+            travelled: f(&joint.travelled),
+            velocity: f(&joint.velocity),
+            acceleration: f(&joint.acceleration),
+            gravity: f(&joint.gravity),
+            load: f(&joint.load),
+        };
+        Samples {
+            len,
+            first: self.first,
+            time: self.time.as_ref().map(&f),
+            joints: self.joints.iter().map(|j| j.as_ref().map(joint)).collect(),
+            channels: self.channels.iter().map(|(name, column)| (name.clone(), f(column))).collect(),
+        }
+    }
+
     /// One of them alone.
     pub(super) fn only(&self, k: usize) -> Samples {
         let one = |column: &Vec<f64>| column.get(k).map_or_else(Vec::new, |x| vec![*x]);

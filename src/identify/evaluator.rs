@@ -224,13 +224,8 @@ impl<'a> Evaluator<'a> {
             }
             return residuals;
         }
-        let rotation = match self.sensor {
-            Sensor::Pose => {
-                Pose::exp(Twist::from_array([0.0, 0.0, 0.0, measured[3], measured[4], measured[5]])).rotation
-            }
-            _ => Mat3::identity(0.0),
-        };
-        let (readings, count) = self.sensor.readings(&work.sweep, &self.state, rotation);
+        let (readings, count) =
+            self.sensor.readings(&work.sweep, &self.state, self.measured_rotation(measured));
         let relative = matches!(self.sensor, Sensor::Distance { absolute: false });
         for (i, reading) in readings.iter().take(count).enumerate() {
             let reference = if i < 3 { measured[i] } else { 0.0 };
@@ -247,6 +242,31 @@ impl<'a> Evaluator<'a> {
             }
         }
         residuals
+    }
+
+    /// How the readings of the sample last moved to answer to a twist behind each joint, six numbers a dyad.
+    pub fn carried_rows(&self, measured: &[f64], work: &Workspace) -> Vec<Vec<f64>> {
+        let dyads = self.machine.dyads().len();
+        if let Sensor::Joint { dyad } = *self.sensor {
+            let mut row = vec![0.0; 6 * dyads];
+            row[6 * dyad..6 * dyad + 6].copy_from_slice(&self.joint_twist(dyad).to_array());
+            return vec![row];
+        }
+        let (readings, count) =
+            self.sensor.readings(&work.sweep, &self.state, self.measured_rotation(measured));
+        let row = |reading: &crate::sensor::Reading<f64>| {
+            (0..dyads).flat_map(|j| work.sweep.carried_block(j, reading.by_twist_w)).collect()
+        };
+        readings.iter().take(count).map(row).collect()
+    }
+
+    fn measured_rotation(&self, measured: &[f64]) -> Mat3<f64> {
+        match self.sensor {
+            Sensor::Pose => {
+                Pose::exp(Twist::from_array([0.0, 0.0, 0.0, measured[3], measured[4], measured[5]])).rotation
+            }
+            _ => Mat3::identity(0.0),
+        }
     }
 
     /// Turns the rows of the dyads that change into their own coordinates and fills the columns of the terms.

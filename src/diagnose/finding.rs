@@ -1,0 +1,374 @@
+//! What a diagnosis says, as data: `docs/diagnosis.md`.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use super::held_out::{self, Model};
+use super::noise::Noise;
+use super::search::{Active, Rival, Search};
+use crate::effects::{Candidates, Identified, Library};
+use crate::machine::Machine;
+
+/// Everything that a diagnosis has to say. Numbers in SI; `docs/diagnosis.md` lists the fields.
+#[derive(Clone, Debug, Serialize)]
+pub struct Diagnosis {
+    /// Name of the machine.
+    pub machine: String,
+    /// File names.
+    pub recordings: Vec<String>,
+    /// Samples judged.
+    pub samples: u64,
+    /// Standard deviation of the noise of lengths, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor_m: Option<f64>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor_rad: Option<f64>,
+    /// RMS of lengths under three models, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_m: Option<RmsByModel>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_rad: Option<RmsByModel>,
+    /// RMS of lengths over stretches that were left out of the fit, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_rms_m: Option<HeldOutRms>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_rms_rad: Option<HeldOutRms>,
+    /// What was found, strongest evidence first.
+    pub findings: Vec<Finding>,
+    /// What no family explains.
+    pub unexplained: Option<Unexplained>,
+}
+
+/// RMS under three models.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct RmsByModel {
+    /// The machine as declared.
+    pub nominal: f64,
+    /// With constant deviations.
+    pub geometric: f64,
+    /// With what was found besides.
+    pub r#final: f64,
+}
+
+/// Held-out RMS under two models.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct HeldOutRms {
+    /// With constant deviations.
+    pub geometric: f64,
+    /// With what was found besides.
+    pub r#final: f64,
+}
+
+/// Held-out RMS without and with one finding.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct HeldOutPair {
+    /// All others taken in.
+    pub before: f64,
+    /// This one too.
+    pub after: f64,
+}
+
+/// One effect.
+#[derive(Clone, Debug, Serialize)]
+pub struct Finding {
+    /// Name of its family.
+    pub effect: String,
+    /// Joint, frame or `measurement`.
+    pub at: String,
+    /// A sentence for a machinist.
+    pub explanation: String,
+    /// Its sizes.
+    pub coefficients: Vec<Size>,
+    /// Probability that name and place are right.
+    pub probability: f64,
+    /// Half of it is the logarithm of the evidence for it.
+    pub delta_bic: f64,
+    /// Lengths on stretches that were left out, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_rms_m: Option<HeldOutPair>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_rms_rad: Option<HeldOutPair>,
+    /// Where it acts.
+    pub r#where: Vec<Where>,
+    /// What these recordings cannot tell from it.
+    pub confusable_with: Vec<Confusable>,
+}
+
+/// A number of a finding.
+#[derive(Clone, Debug, Serialize)]
+pub struct Size {
+    /// Its name.
+    pub name: String,
+    /// SI.
+    pub value: f64,
+    /// Its unit.
+    pub unit: String,
+    /// Standard uncertainty.
+    pub std_error: f64,
+}
+
+/// A stretch of a recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct Where {
+    /// File name.
+    pub recording: String,
+    /// Start, s; absent without time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
+    /// End, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub to_s: Option<f64>,
+    /// Part of what geometry leaves over.
+    pub share_of_misfit: f64,
+}
+
+/// Another name for the same.
+#[derive(Clone, Debug, Serialize)]
+pub struct Confusable {
+    /// Name of the family.
+    pub effect: String,
+    /// Place.
+    pub at: String,
+    /// Its probability.
+    pub probability: f64,
+    /// The motion that would tell them apart.
+    pub separate_by: String,
+}
+
+/// Structure that no family explains.
+#[derive(Clone, Debug, Serialize)]
+pub struct Unexplained {
+    /// How large it is, m (rad where only angles are measured).
+    pub rms_m: f64,
+    /// The place that it fits best.
+    pub at: String,
+    /// Where it acts.
+    pub r#where: Vec<Where>,
+    /// In a sentence.
+    pub explanation: String,
+}
+
+/// What is left may be this part of what geometry leaves over before nothing counts as explained.
+const TOLERATED: f64 = 0.4;
+/// Structure counts beyond this many standard deviations of chance.
+const CHANCE: f64 = 5.0;
+/// Names of which the data say less than this against the best are listed with it.
+const LISTED: f64 = 0.05;
+/// Logarithm of the odds at which a finding is told.
+const TOLD: f64 = 3.0;
+
+/// Residuals with the effects taken away, m and rad.
+pub(super) fn residual_of(search: &Search, active: &[Active]) -> Vec<f64> {
+    let model = held_out::Model::new(search, active);
+    model.residual(search, active)
+}
+
+pub(super) fn report(
+    search: &Search,
+    active: &[Active],
+    machine: &Machine,
+    library: &Library,
+    candidates: &Candidates,
+    noise: &[Noise],
+) -> (Diagnosis, Vec<usize>) {
+    let linear = search.rows.linear;
+    let geometric = search.leftover(&search.base);
+    let full = search.beside(active, None);
+    let left = search.leftover(&full);
+    let explained: f64 = (search.base.apply(&search.rows.residual).norm_squared()
+        - full.apply(&search.rows.residual).norm_squared())
+    .max(0.0);
+    let share_left = left.energy / (left.energy + explained).max(1e-300);
+    let is_unexplained = left.beyond > CHANCE && (active.is_empty() || share_left > TOLERATED);
+    if std::env::var("KINCAL_TRACE").is_ok() {
+        eprintln!(
+            "geometric: energy {:.0} beyond {:.1} heat {:.2}; left: energy {:.0} beyond {:.1} heat {:.2}; explained {:.0}; share left {:.2}",
+            geometric.energy,
+            geometric.beyond,
+            geometric.heat,
+            left.energy,
+            left.beyond,
+            left.heat,
+            explained,
+            share_left
+        );
+    }
+    let noise_of = |angle: bool| {
+        let own = search
+            .runs
+            .iter()
+            .zip(noise)
+            .find(|(run, _)| run.first().is_some_and(|r| linear.angle[*r] == angle));
+        own.map(|(_, noise)| noise.sigma)
+    };
+    let mut findings = Vec::new();
+    let mut kept = Vec::new();
+    let model = Model::new(search, active);
+    for (i, effect) in active.iter().enumerate() {
+        let space = search.beside(active, Some(i));
+        let rivals = search.rivals(&space, left.heat);
+        if std::env::var("KINCAL_TRACE").is_ok() {
+            for r in rivals.iter().take(6) {
+                let c = &search.candidates[r.candidate];
+                eprintln!(
+                    "   {i}: {} @ {}  weight {:.1} gain {:.1} {:?} k={}",
+                    c.effect,
+                    c.place.name(machine),
+                    r.weight,
+                    r.score.gain,
+                    r.score.parameters,
+                    r.score.coefficients
+                );
+            }
+        }
+        let own = rivals.iter().find(|r| r.candidate == effect.candidate);
+        let Some(own) = own.filter(|r| r.weight > TOLD) else { continue };
+        if is_unexplained {
+            continue;
+        }
+        let all: f64 =
+            rivals.iter().map(|r| (r.weight - own.weight).exp()).sum::<f64>() + (-own.weight).exp();
+        let probability = all.recip();
+        let candidate = &search.candidates[effect.candidate];
+        let family = &library.families()[candidate.family];
+        let solved = model.effect(search, active, i);
+        let identified = Identified {
+            family,
+            candidate,
+            coefficients: solved.coefficients,
+            parameters: effect.score.parameters.clone(),
+            covariance: Some(solved.covariance),
+        };
+        let sizes = identified.sizes(&linear.samples);
+        let explanation = identified.sentence(machine, &sizes);
+        let confusable_with = rivals
+            .iter()
+            .filter(|r| r.candidate != effect.candidate && (r.weight - own.weight).exp() > LISTED)
+            .map(|r| confusable(r, own, probability, search, machine, family))
+            .collect();
+        findings.push(Finding {
+            effect: candidate.effect.clone(),
+            at: candidate.place.name(machine),
+            explanation,
+            coefficients: sizes
+                .into_iter()
+                .map(|s| Size {
+                    name: s.name,
+                    value: s.value,
+                    unit: s.unit,
+                    std_error: s.std_error.unwrap_or(f64::NAN),
+                })
+                .collect(),
+            probability,
+            delta_bic: 2.0 * own.weight,
+            held_out_rms_m: None,
+            held_out_rms_rad: None,
+            r#where: wheres(search, &effect.columns, geometric.energy + 1e-300),
+            confusable_with,
+        });
+        kept.push(i);
+    }
+    let unexplained = is_unexplained.then(|| {
+        let space = if active.is_empty() { &search.base } else { &full };
+        let at = search
+            .rivals(space, left.heat)
+            .first()
+            .or(None)
+            .map_or("measurement".to_string(), |r| search.candidates[r.candidate].place.name(machine));
+        let sigma = noise_of(false).or(noise_of(true)).unwrap_or(1.0);
+        let rms_m =
+            sigma * (geometric.energy.max(left.energy) / search.rows.whitener.count().max(1) as f64).sqrt();
+        Unexplained {
+            rms_m,
+            at: at.clone(),
+            r#where: Vec::new(),
+            explanation: format!(
+                "structure of {:.2} um is left that no named effect explains; it fits best at {at}",
+                1e6 * rms_m
+            ),
+        }
+    });
+    let recordings = linear.spans.iter().map(|s| s.label.clone()).collect();
+    let diagnosis = Diagnosis {
+        machine: machine.name().into(),
+        recordings,
+        samples: linear.lines.len() as u64,
+        noise_floor_m: noise_of(false),
+        noise_floor_rad: noise_of(true),
+        rms_m: None,
+        rms_rad: None,
+        held_out_rms_m: None,
+        held_out_rms_rad: None,
+        findings,
+        unexplained,
+    };
+    let _ = candidates;
+    (diagnosis, kept)
+}
+
+fn confusable(
+    rival: &Rival,
+    own: &Rival,
+    probability: f64,
+    search: &Search,
+    machine: &Machine,
+    family: &crate::effects::Family,
+) -> Confusable {
+    let candidate = &search.candidates[rival.candidate];
+    let told = family.look_alikes.iter().find(|l| l.effect == candidate.effect);
+    let at = candidate.place.name(machine);
+    Confusable {
+        effect: candidate.effect.clone(),
+        separate_by: told.map_or_else(
+            || format!("a path on which {at} moves on its own, to and fro over all of its travel"),
+            |l| l.separate_by.replace("{at}", &at),
+        ),
+        at,
+        probability: probability * (rival.weight - own.weight).exp(),
+    }
+}
+
+/// In which recordings an effect's columns have their energy, and when.
+fn wheres(search: &Search, columns: &DMatrix<f64>, total: f64) -> Vec<Where> {
+    let linear = search.rows.linear;
+    let _ = total;
+    let energy = |row: usize| columns.row(row).norm_squared();
+    let all: f64 = columns.norm_squared().max(1e-300);
+    let mut list: Vec<Where> = Vec::new();
+    for (s, span) in linear.spans.iter().enumerate() {
+        let own: f64 = (span.rows.0..span.rows.1).map(energy).sum();
+        if own < 0.02 * all {
+            continue;
+        }
+        let time = linear.samples[s].time.as_deref();
+        let at = |row: usize| time.map(|t| t[linear.sample[row] - span.samples.0]);
+        let mut sum = 0.0;
+        let (mut from, mut to) = (None, None);
+        for row in span.rows.0..span.rows.1 {
+            sum += energy(row);
+            if from.is_none() && sum > 0.02 * own {
+                from = at(row);
+            }
+            if to.is_none() && sum > 0.98 * own {
+                to = at(row);
+            }
+        }
+        list.push(Where {
+            recording: span.label.clone(),
+            from_s: from,
+            to_s: to,
+            share_of_misfit: own / all,
+        });
+    }
+    list.sort_by(|a, b| b.share_of_misfit.total_cmp(&a.share_of_misfit));
+    list
+}
+
+/// A vector of zeros with the same length as the residuals.
+pub(super) fn zeros(search: &Search) -> DVector<f64> {
+    DVector::zeros(search.rows.linear.residual.len())
+}

@@ -1,0 +1,118 @@
+//! All coefficients together, with their covariance, and what they predict where they were not fitted.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::search::{Active, Search};
+
+/// Constant deviations and effects solved together.
+pub(super) struct Model {
+    /// Whitened: constants, then the columns of each effect.
+    columns: DMatrix<f64>,
+    /// First column of each effect.
+    offsets: Vec<usize>,
+    solution: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+/// Numbers of one effect.
+pub(super) struct Solved {
+    /// In SI, one per coefficient of the candidate; those that take no part are 0.
+    pub coefficients: Vec<f64>,
+    /// Coefficients before parameters.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+impl Model {
+    pub fn new(search: &Search, active: &[Active]) -> Self {
+        let mut columns = search.rows.linear.constant.clone();
+        search.rows.whiten(&mut columns);
+        let mut offsets = Vec::new();
+        for effect in active {
+            let at = columns.ncols();
+            offsets.push(at);
+            columns = columns.insert_columns(at, effect.columns.ncols(), 0.0);
+            columns.columns_mut(at, effect.columns.ncols()).copy_from(&effect.columns);
+        }
+        let gram = columns.tr_mul(&columns) + DMatrix::identity(columns.ncols(), columns.ncols());
+        let covariance =
+            gram.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(gram.nrows(), gram.nrows()));
+        let solution = &covariance * columns.tr_mul(&search.rows.residual);
+        Model { columns, offsets, solution, covariance }
+    }
+
+    /// Residuals in m and rad with everything taken away. The columns of effects and constants are taken before whitening.
+    pub fn residual(&self, search: &Search, active: &[Active]) -> Vec<f64> {
+        let linear = search.rows.linear;
+        let mut left = DVector::from_column_slice(&linear.residual);
+        let constants = linear.constant.ncols();
+        left -= &linear.constant * self.solution.rows(0, constants);
+        for (i, effect) in active.iter().enumerate() {
+            if let Some(raw) = search.rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)
+            {
+                let count = effect.columns.ncols();
+                left -=
+                    raw.columns(0, count) * super::search::ROOM * self.solution.rows(self.offsets[i], count);
+            }
+        }
+        left.as_slice().to_vec()
+    }
+
+    /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together.
+    pub fn effect(&self, search: &Search, active: &[Active], i: usize) -> Solved {
+        let effect = &active[i];
+        let candidate = &search.candidates[effect.candidate];
+        let units = search.rows.units(candidate, &effect.score.parameters);
+        let (k, all, parameters) =
+            (effect.columns.ncols(), candidate.coefficients.len(), effect.score.parameters.len());
+        let scale = |c: usize| super::search::ROOM * units[c];
+        let mut coefficients = vec![0.0; all];
+        (0..k).for_each(|c| coefficients[c] = scale(c) * self.solution[self.offsets[i] + c]);
+        // Derivatives by the parameters join the columns.
+        let mut slopes: Vec<(usize, DVector<f64>, f64)> = Vec::new();
+        for (p, parameter) in candidate.parameters.iter().enumerate().filter(|(_, p)| p.smooth) {
+            let value = effect.score.parameters[p];
+            let step = 1e-3 * (parameter.range.1 - parameter.range.0).min(value.abs().max(1e-12));
+            let at = |by: f64| {
+                let mut moved = effect.score.parameters.clone();
+                moved[p] += by;
+                let raw = search.rows.raw_with_units(candidate, &moved, &units)?;
+                let weights = DVector::from_fn(k, |c, _| coefficients[c] / units[c].max(1e-300));
+                let sum = raw.columns(0, k) * weights;
+                let mut white = super::finding::zeros(search);
+                search.rows.whitener.apply(sum.as_slice(), white.as_mut_slice());
+                Some(white)
+            };
+            if let (Some(up), Some(down)) = (at(step), at(-step)) {
+                slopes.push((p, (up - down) / (2.0 * step), parameter.range.1 - parameter.range.0));
+            }
+        }
+        let mut covariance = vec![vec![0.0; all + parameters]; all + parameters];
+        let own = |c: usize| self.offsets[i] + c;
+        if slopes.is_empty() {
+            for a in 0..k {
+                for b in 0..k {
+                    covariance[a][b] = scale(a) * scale(b) * self.covariance[(own(a), own(b))];
+                }
+            }
+            return Solved { coefficients, covariance };
+        }
+        let at = self.columns.ncols();
+        let mut wide = self.columns.clone().insert_columns(at, slopes.len(), 0.0);
+        for (s, (_, column, range)) in slopes.iter().enumerate() {
+            wide.set_column(at + s, &(column * *range));
+        }
+        let gram = wide.tr_mul(&wide) + DMatrix::identity(wide.ncols(), wide.ncols());
+        let Some(inverse) = gram.try_inverse() else { return Solved { coefficients, covariance } };
+        let place = |x: usize| -> (usize, f64) {
+            if x < k { (own(x), scale(x)) } else { (at + x - k, slopes[x - k].2) }
+        };
+        let to = |x: usize| if x < k { x } else { all + slopes[x - k].0 };
+        for a in 0..k + slopes.len() {
+            for b in 0..k + slopes.len() {
+                let ((ia, sa), (ib, sb)) = (place(a), place(b));
+                covariance[to(a)][to(b)] = sa * sb * inverse[(ia, ib)];
+            }
+        }
+        Solved { coefficients, covariance }
+    }
+}

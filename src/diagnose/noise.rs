@@ -1,0 +1,190 @@
+//! The noise of the instrument: how large it is, how long it remembers, and which samples are no noise at all.
+//!
+//! Noise is judged by how much neighbouring readings differ, which a misfit that runs smoothly along the path does not touch;
+//! `docs/diagnosis.md` (60), (61).
+
+use crate::identify::{Linear, Span};
+
+/// Noise of one kind of reading: first-order autoregressive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Noise {
+    /// Standard deviation, m or rad.
+    pub sigma: f64,
+    /// Correlation of neighbouring readings, 0 up to below 1.
+    pub rho: f64,
+}
+
+/// Turns rows into independent ones of unit variance.
+#[derive(Clone, Debug)]
+pub(super) struct Whitener {
+    /// Row before, where noise is remembered from it.
+    previous: Vec<u32>,
+    rho: Vec<f64>,
+    scale: Vec<f64>,
+    /// Rows that are left out.
+    pub out: Vec<bool>,
+}
+
+const NONE: u32 = u32::MAX;
+/// Beyond so many standard deviations of its surroundings a reading is an outlier.
+const OUTLIER: f64 = 5.0;
+/// No instrument resolves less, m or rad.
+const FINEST: f64 = 1e-10;
+/// Longest memory that is told from a drift.
+const MOST_RHO: f64 = 0.97;
+
+/// Rows of one reading of one recording, in their order, without pauses.
+pub(super) fn runs(linear: &Linear) -> Vec<Vec<usize>> {
+    let mut runs = Vec::new();
+    for (s, span) in linear.spans.iter().enumerate() {
+        for reading in 0..span.readings {
+            let mut run = Vec::new();
+            let mut last: Option<f64> = None;
+            for row in (span.rows.0 + reading..span.rows.1).step_by(span.readings) {
+                let local = linear.sample[row] - span.samples.0;
+                let time = linear.samples[s].time.as_ref().map(|t| t[local]);
+                if is_pause(span, last, time) && !run.is_empty() {
+                    runs.push(std::mem::take(&mut run));
+                }
+                last = time;
+                run.push(row);
+            }
+            runs.push(run);
+        }
+    }
+    runs
+}
+
+fn is_pause(span: &Span, last: Option<f64>, now: Option<f64>) -> bool {
+    matches!((last, now), (Some(last), Some(now)) if now - last > span.pause_after)
+}
+
+/// Rows that lie far off their neighbours: by the median of the two on either side.
+pub(super) fn outliers(linear: &Linear, residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
+    let mut out = vec![false; residual.len()];
+    for run in runs.iter().filter(|run| run.len() > 20) {
+        let mut off: Vec<(usize, f64)> = Vec::with_capacity(run.len());
+        for (i, row) in run.iter().enumerate() {
+            let from = i.saturating_sub(3).min(run.len() - 7);
+            let mut near: Vec<f64> =
+                run[from..from + 7].iter().filter(|r| *r != row).map(|r| residual[*r]).collect();
+            near.sort_by(f64::total_cmp);
+            off.push((*row, residual[*row] - 0.5 * (near[2] + near[3])));
+        }
+        let mut sizes: Vec<f64> = off.iter().map(|(_, d)| d.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let scale = (1.4826 * sizes[sizes.len() / 2]).max(FINEST);
+        off.iter().for_each(|(row, d)| out[*row] = d.abs() > OUTLIER * scale);
+        // A reading next to which the path itself jumps is none.
+        let flagged = run.iter().filter(|row| out[**row]).count();
+        if flagged > run.len() / 10 {
+            run.iter().for_each(|row| out[*row] = false);
+        }
+    }
+    let _ = linear;
+    out
+}
+
+/// Half the mean square of differences over `lag` readings, outliers left out, what is beyond four standard deviations cut off.
+fn structure(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], lag: usize) -> Option<f64> {
+    let mut squares: Vec<f64> = Vec::new();
+    for run in runs {
+        for i in lag..run.len() {
+            let (a, b) = (run[i - lag], run[i]);
+            if !out[a] && !out[b] {
+                squares.push(0.5 * (residual[b] - residual[a]).powi(2));
+            }
+        }
+    }
+    if squares.len() < 30 {
+        return None;
+    }
+    let mut cut = f64::INFINITY;
+    let mut mean = 0.0;
+    for _ in 0..4 {
+        mean = squares.iter().map(|s| s.min(cut)).sum::<f64>() / squares.len() as f64;
+        cut = 16.0 * mean;
+    }
+    Some(mean)
+}
+
+/// Noise of some runs that share it. `smooth`: whether the path is followed continuously, so that neighbours see the same misfit.
+pub(super) fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smooth: bool) -> Noise {
+    let all: Vec<f64> =
+        runs.iter().flat_map(|run| run.iter()).filter(|r| !out[**r]).map(|r| residual[*r]).collect();
+    let total = (all.iter().map(|r| r * r).sum::<f64>() / all.len().max(1) as f64).max(FINEST * FINEST);
+    let white = Noise { sigma: total.sqrt(), rho: 0.0 };
+    if !smooth {
+        return white;
+    }
+    let [Some(one), Some(two), Some(three)] = [1, 2, 3].map(|lag| structure(residual, runs, out, lag)) else {
+        return white;
+    };
+    // (60): V_k = σ² (1 - ρ^k). Two estimates of ρ from the first three; misfits only raise them, so the smaller counts.
+    let by_two = two / one - 1.0;
+    let ratio = (three / one - 1.0).max(0.0);
+    let by_three = 0.5 * ((1.0 + 4.0 * ratio).sqrt() - 1.0);
+    let rho = by_two.min(by_three).clamp(0.0, MOST_RHO);
+    let rho = if rho < 0.03 { 0.0 } else { rho };
+    let sigma2 = if rho == 0.0 { one } else { one / (1.0 - rho) };
+    Noise { sigma: sigma2.min(1.05 * total).sqrt().max(FINEST), rho }
+}
+
+impl Whitener {
+    /// For rows of given noise, one per run.
+    pub fn new(rows: usize, runs: &[Vec<usize>], noise: &[Noise], out: Vec<bool>) -> Self {
+        let mut whitener =
+            Whitener { previous: vec![NONE; rows], rho: vec![0.0; rows], scale: vec![0.0; rows], out };
+        for (run, noise) in runs.iter().zip(noise) {
+            let mut last = NONE;
+            for row in run {
+                if whitener.out[*row] {
+                    last = NONE;
+                    continue;
+                }
+                let remembered = last != NONE && noise.rho > 0.0;
+                whitener.scale[*row] = noise.sigma.recip();
+                if remembered {
+                    whitener.previous[*row] = last;
+                    whitener.rho[*row] = noise.rho;
+                    whitener.scale[*row] /= (1.0 - noise.rho * noise.rho).sqrt();
+                }
+                last = *row as u32;
+            }
+        }
+        whitener
+    }
+
+    /// A column of rows, whitened, (61); rows that are left out become 0.
+    pub fn apply(&self, column: &[f64], to: &mut [f64]) {
+        for (row, x) in to.iter_mut().enumerate() {
+            let before = self.previous[row];
+            let remembered = if before == NONE { 0.0 } else { self.rho[row] * column[before as usize] };
+            *x = self.scale[row] * (column[row] - remembered);
+        }
+    }
+
+    /// The transposed of [`Whitener::apply`]: what `aᵀ apply(b)` makes of `a` is `transposed(a)ᵀ b`.
+    pub fn transposed(&self, column: &[f64]) -> Vec<f64> {
+        let mut to = vec![0.0; column.len()];
+        for (row, x) in column.iter().enumerate() {
+            let x = self.scale[row] * x;
+            to[row] += x;
+            let before = self.previous[row];
+            if before != NONE {
+                to[before as usize] -= self.rho[row] * x;
+            }
+        }
+        to
+    }
+
+    /// A column over the noise of fast changes alone, memory left aside.
+    pub fn plain(&self, column: &[f64], to: &mut [f64]) {
+        to.iter_mut().zip(column).zip(&self.scale).for_each(|((to, x), scale)| *to = scale * x);
+    }
+
+    /// How many rows count.
+    pub fn count(&self) -> usize {
+        self.scale.iter().filter(|s| **s > 0.0).count()
+    }
+}

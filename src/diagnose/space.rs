@@ -1,0 +1,94 @@
+//! What is known already: geometry and the effects found so far, marginalised out of everything that is judged, `docs/diagnosis.md` (62).
+
+use nalgebra::{DMatrix, DVector, SVD};
+
+/// The precision of whitened rows after columns with Gaussian priors have been marginalised: `M = I - W Wᵀ`.
+#[derive(Clone)]
+pub(super) struct Space {
+    /// `W`, column by column.
+    w: DMatrix<f64>,
+    /// The same, row by row, for products with many columns.
+    wt: DMatrix<f64>,
+}
+
+impl Space {
+    /// From whitened columns, each times its prior standard deviation.
+    pub fn new(columns: DMatrix<f64>) -> Self {
+        let used: Vec<usize> =
+            (0..columns.ncols()).filter(|c| columns.column(*c).norm_squared() > 1e-20).collect();
+        let columns = columns.select_columns(&used);
+        if columns.ncols() == 0 {
+            return Space { wt: columns.transpose(), w: columns };
+        }
+        let qr = columns.qr();
+        let (q, r) = (qr.q(), qr.r());
+        let svd = SVD::new(r, true, false);
+        let u = svd.u.expect("asked for");
+        let mut turn = u;
+        for (j, s) in svd.singular_values.iter().enumerate() {
+            let kept = (s * s / (1.0 + s * s)).sqrt();
+            turn.column_mut(j).scale_mut(kept);
+        }
+        let w = q * turn;
+        Space { wt: w.transpose(), w }
+    }
+
+    /// From its factor `W`.
+    pub fn of_factor(w: DMatrix<f64>) -> Self {
+        Space { wt: w.transpose(), w }
+    }
+
+    /// `W`.
+    pub fn factor(&self) -> &DMatrix<f64> {
+        &self.w
+    }
+
+    /// With further columns, each times its prior standard deviation.
+    pub fn with(&self, columns: &DMatrix<f64>) -> Self {
+        let mut space = self.clone();
+        for column in columns.column_iter() {
+            let mc = space.apply(&column.into_owned());
+            let length = 1.0 + column.dot(&mc);
+            if length > 1.0 {
+                let at = space.w.ncols();
+                space.w = space.w.insert_column(at, 0.0);
+                space.w.set_column(at, &(mc / length.sqrt()));
+            }
+        }
+        space.wt = space.w.transpose();
+        space
+    }
+
+    /// `M x`.
+    pub fn apply(&self, x: &DVector<f64>) -> DVector<f64> {
+        let along = self.w.tr_mul(x);
+        let mut out = x.clone();
+        out.gemv(-1.0, &self.w, &along, 1.0);
+        out
+    }
+
+    /// `WᵀC`: what of columns lies in the space.
+    pub fn along(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
+        &self.wt * c
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_added_one_by_one_are_marginalised_as_all_at_once() {
+        let column = |seed: f64| DVector::from_fn(50, |i, _| (seed * (i as f64 + 1.0)).sin());
+        let all = DMatrix::from_columns(&[column(0.3) * 3.0, column(0.7), column(1.1) * 1e3]);
+        let (first, rest) = (all.columns(0, 1).into_owned(), all.columns(1, 2).into_owned());
+        let x = column(0.9);
+        let at_once = Space::new(all.clone()).apply(&x);
+        let in_turn = Space::new(first).with(&rest).apply(&x);
+        // M = (I + C Cᵀ)⁻¹, the definition.
+        let full = DMatrix::identity(50, 50) + &all * all.transpose();
+        let exact = full.lu().solve(&x).expect("regular");
+        assert!((&at_once - &exact).amax() < 1e-9, "{}", (&at_once - &exact).amax());
+        assert!((&in_turn - &exact).amax() < 1e-9);
+    }
+}
