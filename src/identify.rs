@@ -18,7 +18,7 @@ pub use information::{Functional, Information};
 pub use loss::Loss;
 pub(crate) use normal::Evaluator;
 pub use solve::{Solver, Stop};
-pub(crate) use source::channel;
+pub(crate) use source::{Known, Source, Sources, channel};
 
 use serde::Serialize;
 
@@ -32,7 +32,7 @@ use crate::units::Quantity;
 use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
-use source::Sources;
+
 use thin::Thin;
 use unknowns::{Layout, Role, Unknowns};
 

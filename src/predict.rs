@@ -30,6 +30,9 @@ pub struct Prediction {
     /// Mean, m: signed for scalars, of the norm for vectors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_m: Option<f64>,
+    /// Mean of the residual's norm, m; of a `distance` the mean radial error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_abs_m: Option<f64>,
     /// Root mean square of the rotation residual, rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_rad: Option<f64>,
@@ -39,6 +42,9 @@ pub struct Prediction {
     /// Mean rotation residual, rad; signed for scalars.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_rad: Option<f64>,
+    /// Mean of the rotation residual's norm, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_abs_rad: Option<f64>,
     /// Samples at which a joint leaves the range that the calibration has seen.
     pub extrapolated_samples: u64,
 }
@@ -50,6 +56,7 @@ struct Sums {
     squares: f64,
     largest: f64,
     total: f64,
+    total_norm: f64,
 }
 
 impl Sums {
@@ -59,12 +66,13 @@ impl Sums {
         self.squares += norm * norm;
         self.largest = self.largest.max(norm);
         self.total += if let [scalar] = residual { *scalar } else { norm };
+        self.total_norm += norm;
     }
 
-    fn figures(&self) -> [Option<f64>; 3] {
+    fn figures(&self) -> [Option<f64>; 4] {
         let n = self.count as f64;
         let some = |x: f64| (self.count > 0).then_some(x);
-        [some((self.squares / n).sqrt()), some(self.largest), some(self.total / n)]
+        [some((self.squares / n).sqrt()), some(self.largest), some(self.total / n), some(self.total_norm / n)]
     }
 }
 
@@ -130,7 +138,8 @@ pub fn predict(
         }
         dropped += block.chunk.dropped;
     }
-    let ([rms_m, max_m, mean_m], [rms_rad, max_rad, mean_rad]) = (lengths.figures(), angles.figures());
+    let [rms_m, max_m, mean_m, mean_abs_m] = lengths.figures();
+    let [rms_rad, max_rad, mean_rad, mean_abs_rad] = angles.figures();
     let samples = lengths.count.max(angles.count);
     Ok(Prediction {
         samples,
@@ -138,9 +147,11 @@ pub fn predict(
         rms_m,
         max_m,
         mean_m,
+        mean_abs_m,
         rms_rad,
         max_rad,
         mean_rad,
+        mean_abs_rad,
         extrapolated_samples: extrapolated,
     })
 }
@@ -150,7 +161,7 @@ fn is_revolute(machine: &Machine, dyad: usize) -> bool {
 }
 
 /// The chain of the recording's set-up.
-fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Result<Chain<f64>> {
+pub(crate) fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Result<Chain<f64>> {
     match calibrated.chain_of_setup(&header.setup) {
         Some(chain) => Ok(chain),
         None if header.workpiece_frame_unknown && !matches!(sensor, Sensor::Joint { .. }) => {
@@ -175,7 +186,7 @@ fn missing(what: String, known: &[&str]) -> Error {
     Error::Undetermined { what, mend: format!("add --fit-setup to find it from this recording{known}") }
 }
 
-fn sensor_state(
+pub(crate) fn sensor_state(
     calibrated: &CalibratedMachine,
     header: &Header,
     sensor: &Sensor,
