@@ -4,21 +4,23 @@
 //! deviations, which is the prior of `docs/model.md` (20), so that after the last sample of a recording it stands where least squares with
 //! that prior stands. `docs/rivals.md` has the equations.
 
+mod stream;
+mod unknowns;
+
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
 
 use super::Fitted;
-use super::scheme::measured_rotation;
 use super::state;
 use crate::calibration::CalibratedMachine;
-use crate::chain::{Chain, deviation_jacobian};
+use crate::chain::deviation_jacobian;
 use crate::error::{Error, Result};
-use crate::identify::{COMPONENTS, Known, Loss, Options, Stop, calibrate, channel};
-use crate::lie::{Pose, Twist, Vec3};
-use crate::machine::{JointKind, Machine, Tolerance};
-use crate::recording::{Header, NominalLength, Recording, ToolPoint};
+use crate::identify::{COMPONENTS, Loss, Options, Stop, calibrate};
+use crate::lie::{Pose, Twist};
+use crate::machine::{Machine, Tolerance};
+use crate::recording::Recording;
 use crate::rms::Rms;
-use crate::sensor::{Sensor, SensorState};
-use crate::units::Quantity;
+use stream::Opened;
+use unknowns::{Block, FrameW, Role, Values};
 
 /// Standard deviations of one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,54 +72,6 @@ pub struct Update {
     pub surprise: f64,
     /// Weight with which it counted, 0 to 1; 0 for a sample with a number missing.
     pub weight: f64,
-}
-
-/// Where an unknown stands in the state.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Role {
-    Dyad(usize),
-    Frame(usize),
-    ToolPoint(usize),
-    Zero(usize),
-    Length(usize),
-}
-
-#[derive(Clone, Debug)]
-struct Block {
-    role: Role,
-    offset: usize,
-    scale: Vec<f64>,
-}
-
-/// Frame `w` of one set-up.
-#[derive(Clone, Debug)]
-struct FrameW {
-    setup: String,
-    /// In the frame before it; where it is found from nothing this is what moves.
-    previous_from_w: Pose<f64>,
-    dh: Twist<f64>,
-    free: bool,
-}
-
-#[derive(Clone, Debug)]
-struct Values {
-    dh: Vec<Twist<f64>>,
-    frames: Vec<FrameW>,
-    tool_points: Vec<(String, Vec3<f64>)>,
-    /// Set-up, channel, value; `None` until the first reading.
-    zeros: Vec<(String, String, Option<f64>)>,
-    lengths: Vec<(String, Option<f64>)>,
-}
-
-#[derive(Clone, Debug)]
-struct Opened {
-    sensor: Sensor,
-    frame: usize,
-    tool_point: Known<Vec3<f64>>,
-    workpiece_point: Vec3<f64>,
-    zero: Known<f64>,
-    length: Known<f64>,
-    sigmas: Vec<f64>,
 }
 
 /// The filter.
@@ -190,115 +144,6 @@ impl Kalman {
     pub fn with_setups(mut self, known: &CalibratedMachine) -> Self {
         self.known = Some(known.clone());
         self
-    }
-
-    /// Adds unknowns to the state, at their scale's standard deviation.
-    fn grow(&mut self, role: Role, scale: Vec<f64>) {
-        let (offset, more) = (self.covariance.nrows(), scale.len());
-        self.covariance = std::mem::take(&mut self.covariance).resize(offset + more, offset + more, 0.0);
-        (offset..offset + more).for_each(|k| self.covariance[(k, k)] = 1.0);
-        self.blocks.push(Block { role, offset, scale });
-    }
-
-    /// Takes up a stream of samples as the head of a recording describes it. Streams of one set-up share frame `w` and its unknowns,
-    /// those that name the same tool point share that.
-    ///
-    /// # Errors
-    /// [`Error::Undetermined`] where its noise is stated nowhere, or where frame `w` or a tool point is unknown and nothing says
-    /// where to start.
-    pub fn open(&mut self, header: &Header) -> Result<Stream> {
-        let sensor = Sensor::of(header);
-        let Tolerance { translation, rotation } = self.options.setup;
-        let sigmas = self.sigmas(header, &sensor)?;
-        let frame = self.frame(header)?;
-        let tool_point = match &header.tool_point {
-            ToolPoint::Known(at) => Known::Value(*at),
-            ToolPoint::Unknown(name) => {
-                let own = self.values.tool_points.iter().position(|(known, _)| known == name);
-                Known::Unknown(match own {
-                    Some(i) => i,
-                    None => {
-                        let known = self.known.as_ref().and_then(|k| k.tool_points().find(|p| p.0 == name));
-                        let at = known.ok_or_else(|| no_start(&format!("tool point \"{name}\"")))?.1;
-                        self.values.tool_points.push((name.clone(), at));
-                        let i = self.values.tool_points.len() - 1;
-                        self.grow(Role::ToolPoint(i), vec![translation; 3]);
-                        i
-                    }
-                })
-            }
-        };
-        let mut zero = Known::Value(0.0);
-        if header.zero_unknown && sensor.has_zero() {
-            let key = (header.setup.clone(), channel(&sensor, &self.machine));
-            let own = self.values.zeros.iter().position(|(s, c, _)| (s, c) == (&key.0, &key.1));
-            zero = Known::Unknown(own.unwrap_or_else(|| {
-                self.values.zeros.push((key.0, key.1, None));
-                let i = self.values.zeros.len() - 1;
-                let angle = self.quantity(&sensor, 0) == Quantity::Angle;
-                self.grow(Role::Zero(i), vec![if angle { rotation } else { translation }]);
-                i
-            }));
-        }
-        let length = match header.nominal_length {
-            NominalLength::Known(length) => Known::Value(length),
-            NominalLength::Unknown if sensor == (Sensor::Distance { absolute: false }) => {
-                let own = self.values.lengths.iter().position(|(s, _)| *s == header.setup);
-                Known::Unknown(own.unwrap_or_else(|| {
-                    self.values.lengths.push((header.setup.clone(), None));
-                    let i = self.values.lengths.len() - 1;
-                    self.grow(Role::Length(i), vec![translation]);
-                    i
-                }))
-            }
-            _ => Known::Value(0.0),
-        };
-        let workpiece_point = header.workpiece_point;
-        self.streams.push(Opened { sensor, frame, tool_point, workpiece_point, zero, length, sigmas });
-        Ok(Stream(self.streams.len() - 1))
-    }
-
-    fn frame(&mut self, header: &Header) -> Result<usize> {
-        if let Some(i) = self.values.frames.iter().position(|f| f.setup == header.setup) {
-            return Ok(i);
-        }
-        let w = self.machine.w_index();
-        let free = header.workpiece_frame_unknown && header.measurement.sees_frames();
-        let mut previous_from_w = self.machine.dyads()[w].placement.pose();
-        let mut scale = self.machine.tolerance(w).to_array();
-        if free {
-            let known = self.known.as_ref().and_then(|k| k.setups().find(|s| s.0 == header.setup));
-            previous_from_w = known.ok_or_else(|| no_start("frame w of this set-up"))?.1;
-            scale = self.options.setup.to_array();
-        }
-        let dh = Twist::zero(0.0);
-        self.values.frames.push(FrameW { setup: header.setup.clone(), previous_from_w, dh, free });
-        let i = self.values.frames.len() - 1;
-        self.grow(Role::Frame(i), scale.to_vec());
-        Ok(i)
-    }
-
-    fn quantity(&self, sensor: &Sensor, i: usize) -> Quantity {
-        let prismatic = match sensor {
-            Sensor::Joint { dyad } => {
-                self.machine.dyads()[*dyad].joint.as_ref().is_some_and(|j| j.kind == JointKind::Prismatic)
-            }
-            _ => true,
-        };
-        sensor.quantity(i, prismatic)
-    }
-
-    fn sigmas(&self, header: &Header, sensor: &Sensor) -> Result<Vec<f64>> {
-        let of = |i: usize| {
-            let quantity = self.quantity(sensor, i);
-            let stated = header.sigma.filter(|s| s.quantity == quantity).map(|s| s.value);
-            let given = self.options.noise.map(|n| if quantity == Quantity::Angle { n.rad } else { n.m });
-            stated.or(given).filter(|s| *s > 0.0 && s.is_finite()).ok_or_else(|| Error::Undetermined {
-                what: "a filter needs the noise of the instrument, and the recording states none".into(),
-                mend: "add `# sigma[um]: ...` to the head of the recording, or give the noise".into(),
-            })
-        };
-        (0..sensor.reading_count()).map(of).collect()
     }
 
     /// Takes in one sample: commands (m or rad, machine order) and measured numbers as in a chunk of a recording.
@@ -405,108 +250,6 @@ impl Kalman {
         }
     }
 
-    /// The values moved by an offset in units of the scales.
-    fn moved(&self, offset: &DVector<f64>) -> Values {
-        let mut next = self.values.clone();
-        for block in &self.blocks {
-            let at = |k: usize| offset[block.offset + k] * block.scale[k];
-            let twist = || Twist::from_array(std::array::from_fn(at));
-            match block.role {
-                Role::Dyad(j) => next.dh[j] = next.dh[j] + twist(),
-                Role::Frame(i) => next.frames[i].dh = next.frames[i].dh + twist(),
-                Role::ToolPoint(i) => {
-                    next.tool_points[i].1 = next.tool_points[i].1 + Vec3(std::array::from_fn(at));
-                }
-                Role::Zero(i) => next.zeros[i].2 = next.zeros[i].2.map(|z| z + at(0)),
-                Role::Length(i) => next.lengths[i].1 = next.lengths[i].1.map(|l| l + at(0)),
-            }
-        }
-        next
-    }
-
-    /// Residuals at the values moved by `offset`, and the rows of the readings over the scaled state there.
-    fn linearised(
-        &self,
-        opened: &Opened,
-        commands: &[f64],
-        measured: &[f64],
-        offset: &DVector<f64>,
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let values = self.moved(offset);
-        let count = opened.sensor.reading_count();
-        let mut residuals = DVector::zeros(count);
-        let mut rows = DMatrix::zeros(count, offset.len());
-        let frame = &values.frames[opened.frame];
-        let zero = match opened.zero {
-            Known::Value(zero) => zero,
-            Known::Unknown(i) => values.zeros[i].2.unwrap_or(0.0),
-        };
-        let block = |role: Role| self.blocks.iter().find(|b| b.role == role);
-        let mut put = |i: usize, role: Role, row: &[f64]| {
-            if let Some(block) = block(role) {
-                row.iter()
-                    .zip(&block.scale)
-                    .enumerate()
-                    .for_each(|(k, (x, s))| rows[(i, block.offset + k)] = x * s);
-            }
-        };
-        if let Sensor::Joint { dyad } = opened.sensor {
-            let xi = self.machine.dyads()[dyad].joint.as_ref().map_or(Twist::zero(0.0), |j| j.twist());
-            let dh = values.dh[dyad];
-            let displacement = self.machine.displacements(commands)[dyad];
-            residuals[0] = measured[0] - (displacement + xi.v.dot(dh.v) + xi.w.dot(dh.w) + zero);
-            put(0, Role::Dyad(dyad), &xi.to_array());
-            if let Some(i) = opened.zero.unknown() {
-                put(0, Role::Zero(i), &[1.0]);
-            }
-            return (residuals, rows);
-        }
-        let w = self.machine.w_index();
-        let mut chain = Chain::new(&self.machine, &values.dh);
-        chain.set_previous_from_frame(w, frame.previous_from_w * Pose::exp(frame.dh));
-        let sweep = chain.sweep(commands);
-        let state = SensorState {
-            tool_point_t: match opened.tool_point {
-                Known::Value(at) => at,
-                Known::Unknown(i) => values.tool_points[i].1,
-            },
-            workpiece_point_w: opened.workpiece_point,
-            length: match opened.length {
-                Known::Value(length) => length,
-                Known::Unknown(i) => values.lengths[i].1.unwrap_or(0.0),
-            },
-            zero,
-        };
-        let (readings, _) =
-            opened.sensor.readings(&sweep, &state, measured_rotation(&opened.sensor, measured));
-        let mut row = vec![0.0; 6 * self.machine.dyads().len()];
-        for (i, reading) in readings.iter().take(count).enumerate() {
-            residuals[i] = if i < 3 { measured[i] } else { 0.0 } - reading.value;
-            sweep.error_row(reading.by_twist_w, &mut row);
-            for (j, own) in row.chunks(6).enumerate() {
-                let (role, dh) = if j == w {
-                    (Role::Frame(opened.frame), frame.dh)
-                } else {
-                    (Role::Dyad(j), values.dh[j])
-                };
-                // (12): from the increment to the deviation's own coordinates.
-                let turn = deviation_jacobian(dh);
-                let by_dh: [f64; 6] = std::array::from_fn(|k| (0..6).map(|m| own[m] * turn[m][k]).sum());
-                put(i, role, &by_dh);
-            }
-            if let Some(p) = opened.tool_point.unknown() {
-                put(i, Role::ToolPoint(p), &reading.by_tool_point_t.0);
-            }
-            if let Some(z) = opened.zero.unknown() {
-                put(i, Role::Zero(z), &[1.0]);
-            }
-            if let Some(l) = opened.length.unknown() {
-                put(i, Role::Length(l), &[-1.0]);
-            }
-        }
-        (residuals, rows)
-    }
-
     /// A frame that is found from nothing keeps no deviation: its pose moves, and its covariance goes with it.
     fn settle_free_frames(&mut self, offset: &DVector<f64>) {
         for (i, frame) in self.values.frames.iter_mut().enumerate().filter(|(_, f)| f.free) {
@@ -577,15 +320,6 @@ impl Kalman {
         found.zeros = self.values.zeros.iter().filter_map(zero).collect();
         found.lengths = self.values.lengths.iter().filter_map(|(s, l)| Some((s.clone(), (*l)?))).collect();
         found
-    }
-}
-
-fn no_start(what: &str) -> Error {
-    Error::Undetermined {
-        what: format!("{what} is unknown, and a filter needs somewhere to start"),
-        mend:
-            "give it a file whose calibration knows the set-up (`kincal calibrate` on a few samples finds it)"
-                .into(),
     }
 }
 

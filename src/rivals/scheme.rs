@@ -67,6 +67,20 @@ impl Scheme {
         Ok(Fitted { calibrated: state.calibrated(machine, &sources), steps, stop })
     }
 
+    /// Singular values of the scheme's own Jacobian at the machine as declared, largest first, plain m and rad. Where unknowns are not
+    /// confined to what can be a machine ([`Form::Free`]), more of them seem to show than there are.
+    ///
+    /// # Errors
+    /// If a recording cannot be read.
+    pub fn singular_values(&self, machine: &Machine, recordings: &[Recording]) -> Result<Vec<f64>> {
+        let sources = Sources::new(recordings, machine, &|_| {})?;
+        let state = State::declared(machine, recordings, &sources)?;
+        let (triangle, _) = self.linearised(machine, &sources, Places::new(machine, &sources), &state)?;
+        let mut values: Vec<f64> = triangle.finish().0.singular_values().iter().copied().collect();
+        values.sort_by(|a, b| b.total_cmp(a));
+        Ok(values)
+    }
+
     /// Rows and residuals of all samples, and the sum of squared residuals.
     fn linearised(
         &self,

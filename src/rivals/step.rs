@@ -68,7 +68,7 @@ impl Triangle {
         self.filled = 0;
     }
 
-    /// `R`, `Qᵀ r`, and the norm of what no `x` can take away.
+    /// `R` and `Qᵀ r`.
     pub fn finish(mut self) -> (DMatrix<f64>, DVector<f64>) {
         self.turn_in();
         let width = self.stack.ncols() - 1;
