@@ -160,10 +160,13 @@ fn render(machine: &str, samples: u64, judged_by: &str, has_truth: bool, verdict
     let mut head = vec!["rival", "steps", "fitted", "judged", "largest"];
     head.extend(truth_heads);
     let mut rows = vec![head.into_iter().map(String::from).collect::<Vec<_>>()];
-    let mut failed = String::new();
+    let mut failed: Vec<(&str, Vec<&str>)> = Vec::new();
     for verdict in verdicts {
         if let Some(why) = &verdict.failed {
-            failed.push_str(&format!("{} failed: {why}\n", verdict.rival));
+            match failed.iter_mut().find(|(reason, _)| reason == why) {
+                Some((_, names)) => names.push(&verdict.rival),
+                None => failed.push((why, vec![&verdict.rival])),
+            }
         }
         let both = |m: Option<f64>, rad: Option<f64>| {
             m.map(length).into_iter().chain(rad.map(angle)).collect::<Vec<_>>().join(", ")
@@ -187,9 +190,8 @@ fn render(machine: &str, samples: u64, judged_by: &str, has_truth: bool, verdict
              true reading: mean difference from readings without noise\n",
         );
     }
-    if !failed.is_empty() {
-        text.push('\n');
-        text.push_str(&failed);
+    for (why, names) in failed {
+        text.push_str(&format!("\n{} failed: {why}\n", names.join(", ")));
     }
     text
 }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::scheme::measured_rotation;
 use crate::calibration::CalibratedMachine;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::predict::{chain, predict, sensor_state};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
@@ -106,7 +106,7 @@ pub fn against_truth(
         let own = (chain(model, header, &sensor)?, sensor_state(model, header, &sensor)?);
         // The truth may be a file that was never calibrated on this set-up: frame w is then the one that it declares.
         let true_chain = truth.chain_of_setup(&header.setup).unwrap_or_else(|| truth.chain());
-        let real = (true_chain, sensor_state(truth, header, &sensor)?);
+        let real = (true_chain, sensor_state(truth, header, &sensor).map_err(of_truth)?);
         let (commands, values) = (model.machine().commands().len(), recording.value_count());
         for chunk in recording.chunks()? {
             let chunk = chunk?;
@@ -135,4 +135,15 @@ pub fn against_truth(
         tilt_rad: sums.tilt_rad / count,
         reading_m: sums.reading_m / count,
     }))
+}
+
+/// What only a file of the truth can know is not to be found from a recording.
+fn of_truth(error: Error) -> Error {
+    match error {
+        Error::Undetermined { what, .. } => Error::Undetermined {
+            what: format!("true machine: {what}"),
+            mend: "state it in the `calibration` of the true machine's file, or judge without it".into(),
+        },
+        other => other,
+    }
 }
