@@ -26,7 +26,7 @@ pub fn full_turn(count: usize) -> Vec<f64> {
 
 /// Angles of the bar and the tool on the cone of radius `length`: bar vector (m), A and C of the program (rad; C as in the print, 0 to
 /// 360 deg).
-fn cone(length: f64, phi: f64, before: f64) -> (Vec3<f64>, f64, f64) {
+pub fn cone(length: f64, phi: f64, before: f64) -> (Vec3<f64>, f64, f64) {
     let (e, n) = (Vec3([0.0, -0.5, 0.75f64.sqrt()]), Vec3([0.0, 0.75f64.sqrt(), 0.5]));
     let m = n.times(phi.cos()) + Vec3([phi.sin(), 0.0, 0.0]);
     let half = 0.5f64.sqrt();

@@ -232,3 +232,21 @@ fn on_distances_both_well_posed_forms_fit_alike_and_free_columns_do_not() {
         assert!(ours[2][0] > 1.5 * ours[0][0], "{name}: {}", ours[2][0]);
     }
 }
+
+#[test]
+fn both_well_posed_forms_are_there_in_three_truncated_steps() {
+    let machine = machine();
+    let qs = table_7_path(&machine, &full_turn(100));
+    let truth = true_machine(&machine, Preset::TWISTS);
+    let svd = Step::Truncated { cut: 1e-3, unit_m: 1.0 };
+    let radial =
+        |form, steps| median_of(&runs(&truth, &qs, 1e-6, Kind::Distance, scheme(form, svd, steps)), 0) * 1e6;
+    for form in [Form::Factors, Form::Tangent] {
+        let (three, thirty) = (radial(form, 3), radial(form, 30));
+        println!("{form:?}: radial error {three:.4} um after three steps, {thirty:.4} at the end");
+        assert!((three / thirty - 1.0).abs() < 1e-3, "{form:?}: {three} against {thirty}");
+    }
+    let free = radial(Form::Free, 30);
+    println!("Free: {free:.3} um after thirty");
+    assert!(free > 2.0 * radial(Form::Factors, 3), "{free}");
+}
