@@ -308,6 +308,25 @@ fn a_filter_without_noise_or_start_says_what_it_needs() {
 }
 
 #[test]
+fn a_bar_between_two_points_that_coincide_is_left_out_by_the_filter_and_told_by_the_schemes() {
+    let machine = common::machine("linear_axis");
+    let bar = "# measurement: distance\n# sigma[um]: 1\nx[m],r[m]\n0,0\n0.1,0.1\n0.2,0.2\n";
+    let bar = Recording::from_bytes("bar.csv", bar.as_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"));
+    let mut filter = Kalman::new(&machine, KalmanOptions::default());
+    let stream = filter.open(bar.header()).unwrap_or_else(|e| panic!("{e}"));
+    let nowhere = filter.update(stream, &[0.0], &[0.0]).expect("it says nothing, and is no fault");
+    assert_eq!((nowhere.weight, filter.samples()), (0.0, 0));
+    assert!(filter.covariance().iter().all(|x| x.is_finite()));
+    filter.update(stream, &[0.1], &[0.1]).expect("this one says something");
+    assert_eq!(filter.samples(), 1);
+    for form in [Form::Local, Form::Factors, Form::Tangent, Form::Free] {
+        let scheme = Scheme { form, step: Step::Truncated { cut: 1e-3, unit_m: 1.0 }, steps: 3 };
+        let error = Rival::Scheme(scheme).fit(&machine, std::slice::from_ref(&bar)).expect_err("refused");
+        assert!(error.to_string().contains("no direction"), "{error}");
+    }
+}
+
+#[test]
 fn a_split_recording_has_every_sample_once_and_the_picked_ones_evenly_spread() {
     let machine = common::machine("ac_table_tilting");
     let (_, recording) = measured(&machine, 0.1, Sensor::Position, (0.0, 0.0), 1001, &["sigma[um]: 1"]);

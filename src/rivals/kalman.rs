@@ -70,7 +70,7 @@ pub struct Update {
     /// Mean square, over the readings of the sample, of measured minus expected in standard deviations of both; near 1 while the model
     /// holds.
     pub surprise: f64,
-    /// Weight with which it counted, 0 to 1; 0 for a sample with a number missing.
+    /// Weight with which it counted, 0 to 1; 0 for a sample with a number missing, or at which the model has no reading.
     pub weight: f64,
 }
 
@@ -180,7 +180,10 @@ impl Kalman {
             let ph = &self.covariance * h.transpose();
             let spread = &h * &ph;
             if i == 0 {
-                let Some(factor) = Cholesky::new(&spread + &noise) else { break };
+                // A distance of zero has no direction: such a sample says nothing.
+                let Some(factor) = Cholesky::new(&spread + &noise) else {
+                    return Ok(Update { surprise: f64::INFINITY, weight: 0.0 });
+                };
                 surprise = innovation.dot(&factor.solve(&innovation)) / count as f64;
                 weight = self.options.loss.at(surprise).1;
                 if weight <= 0.0 {

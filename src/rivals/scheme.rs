@@ -54,13 +54,10 @@ impl Scheme {
             }
             squares = now;
             let (r, y) = triangle.finish();
-            let step = self.step.solve(&r, &y, |k| places.is_translation(k))?;
-            if !step.iter().all(|x| x.is_finite()) {
-                return Err(Error::Undetermined {
-                    what: format!("step {} is not finite: the scheme has run away", steps + 1),
-                    mend: "damp the step more, or truncate it".into(),
-                });
+            if !r.iter().chain(y.iter()).all(|x| x.is_finite()) {
+                return Err(not_finite(steps));
             }
+            let step = self.step.solve(&r, &y, |k| places.is_translation(k))?;
             state = stepped(self.form, machine, places, &state, &step);
             steps += 1;
         }
@@ -132,6 +129,19 @@ impl Scheme {
             },
         )?;
         Ok((triangle, squares))
+    }
+}
+
+fn not_finite(steps: usize) -> Error {
+    if steps == 0 {
+        return Error::Undetermined {
+            what: "at the machine as declared a reading or its row is not finite: a bar of length zero has no direction".into(),
+            mend: "check `workpiece_point` and `tool_point` of the recordings, or leave such samples out".into(),
+        };
+    }
+    Error::Undetermined {
+        what: format!("after {steps} steps the model has no finite readings: the scheme has run away"),
+        mend: "damp the step more, or truncate it".into(),
     }
 }
 
