@@ -32,7 +32,6 @@ use crate::units::Quantity;
 use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
-
 use thin::Thin;
 use unknowns::{Layout, Role, Unknowns};
 

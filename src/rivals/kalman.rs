@@ -91,12 +91,12 @@ pub struct Update {
 /// let head = Recording::from_bytes("live", head.as_bytes(), &machine)?;
 /// let mut filter = Kalman::new(&machine, KalmanOptions::default());
 /// let stream = filter.open(head.header())?;
-/// let z = machine.frame_index("x").expect("a frame");
+/// let j = machine.frame_index("x").expect("a frame");
 /// for k in 0..50 {
 ///     let x = 0.01 * f64::from(k);
 ///     filter.update(stream, &[x], &[x, 0.0, 0.08 - 1e-4 * x])?; // it runs down by 0.1 mm per m
 /// }
-/// let pitch = filter.calibrated().deviations()[z].w.0[1] - filter.calibrated().deviations()[0].w.0[1];
+/// let pitch = filter.calibrated().deviations()[j].w.0[1] - filter.calibrated().deviations()[0].w.0[1];
 /// assert!((pitch - 1e-4).abs() < 1e-5);
 /// # Ok::<(), kincal::Error>(())
 /// ```
@@ -152,7 +152,10 @@ impl Kalman {
     /// [`Error::Undetermined`] where the number of commands or readings is not that of machine and stream.
     pub fn update(&mut self, stream: Stream, commands: &[f64], measured: &[f64]) -> Result<Update> {
         let opened = self.streams.get(stream.0).cloned();
-        let opened = opened.ok_or_else(|| miscounted("stream", stream.0, self.streams.len()))?;
+        let opened = opened.ok_or_else(|| Error::Undetermined {
+            what: "this filter has not taken up that stream".into(),
+            mend: "open the stream with the filter that its samples go to".into(),
+        })?;
         let count = opened.sensor.reading_count();
         if commands.len() != self.machine.commands().len() {
             return Err(miscounted("commands", commands.len(), self.machine.commands().len()));
@@ -245,6 +248,9 @@ impl Kalman {
         }
         let still = DVector::zeros(self.covariance.nrows());
         let residual = self.linearised(opened, commands, measured, &still).0[0];
+        if !residual.is_finite() {
+            return;
+        }
         if let Some(i) = zero {
             self.values.zeros[i].2 = Some(residual);
         }

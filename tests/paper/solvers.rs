@@ -80,6 +80,9 @@ fn solvers_end_where_the_facts_say() {
         close(&format!("{name}, radial"), radial, 5.17, 0.02);
     }
     let all = Step::Truncated { cut: 1e-9, unit_m: 1.0 };
+    let exact = median_of(&runs(&truth, &qs, 0.0, Kind::Distance, scheme(Form::Factors, all, 5)), 1) * 1e6;
+    println!("noise-free, all 12 directions: dp {exact:.1} um (13.0)");
+    close("noise-free", exact, 13.0, 0.15);
     let (one, many) = (
         runs(&truth, &qs, 1e-5, Kind::Distance, scheme(Form::Factors, all, 1)),
         runs(&truth, &qs, 1e-5, Kind::Distance, scheme(Form::Factors, all, 30)),
