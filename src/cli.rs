@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod check;
+mod compare;
 mod demo;
 mod describe;
 mod diagnose;
@@ -29,6 +30,8 @@ enum Command {
     Check(check::Args),
     /// Identifies the deviations of a machine from recordings
     Calibrate(calibrate::Args),
+    /// Other ways to identify, fitted to the same recordings and judged side by side
+    Compare(compare::Args),
     /// What a calibrated machine says the instrument would read, sample by sample
     Predict(predict::Args),
     /// Locates what a model leaves over, names the physics left out, and models it
@@ -54,6 +57,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Describe(args) => describe::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Predict(args) => predict::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Demo(args) => demo::run(&args),

@@ -27,7 +27,7 @@ pub use judge::{Figures, PieceFit};
 pub(crate) use linear::{Linear, Span, linear};
 pub use loss::Loss;
 pub use solve::{Solver, Stop};
-pub(crate) use source::channel;
+pub(crate) use source::{Known, Source, Sources, channel};
 pub(crate) use stretch::{Beginning, Memories, Stretch, stretches};
 
 use serde::Serialize;
@@ -43,7 +43,6 @@ use crate::variation::{Variation, Varying};
 use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
-use source::Sources;
 use thin::Thin;
 use unknowns::{Block, Layout, Role, Unknowns};
 

@@ -32,6 +32,7 @@
 //! | [`location`] | the same geometry as ISO 230-1 location errors |
 //! | [`CalibratedMachine`] | a machine file with its deviations |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
+//! | [`rivals`] | identification by other schemes, and a filter, judged side by side |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
 //! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known |
 //!
@@ -87,6 +88,7 @@ pub mod motion;
 pub mod nc;
 pub mod predict;
 pub mod recording;
+pub mod rivals;
 mod rms;
 mod scalar;
 pub mod sensor;

@@ -5,6 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use crate::calibration::CalibratedMachine;
+use crate::chain::Chain;
 use crate::error::{Error, Result};
 use crate::identify::{Beginning, Evaluator, Memories, Moment, Stretch, Values, channel, stretches};
 use crate::lie::{Pose, Twist, Vec3};
@@ -29,6 +30,9 @@ pub struct Prediction {
     /// Mean, m: signed for scalars, of the norm for vectors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_m: Option<f64>,
+    /// Mean of the residual's norm, m; of a `distance` the mean radial error.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_abs_m: Option<f64>,
     /// Root mean square of the rotation residual, rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_rad: Option<f64>,
@@ -38,6 +42,9 @@ pub struct Prediction {
     /// Mean rotation residual, rad; signed for scalars.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean_rad: Option<f64>,
+    /// Mean of the rotation residual's norm, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_abs_rad: Option<f64>,
     /// Samples at which a joint leaves the range that the calibration has seen.
     pub extrapolated_samples: u64,
     /// Samples with a pattern of directions of travel that the calibration has not seen; they are predicted from what single
@@ -52,6 +59,7 @@ struct Sums {
     squares: f64,
     largest: f64,
     total: f64,
+    total_norm: f64,
 }
 
 impl Sums {
@@ -61,12 +69,13 @@ impl Sums {
         self.squares += norm * norm;
         self.largest = self.largest.max(norm);
         self.total += if let [scalar] = residual { *scalar } else { norm };
+        self.total_norm += norm;
     }
 
-    fn figures(&self) -> [Option<f64>; 3] {
+    fn figures(&self) -> [Option<f64>; 4] {
         let n = self.count as f64;
         let some = |x: f64| (self.count > 0).then_some(x);
-        [some((self.squares / n).sqrt()), some(self.largest), some(self.total / n)]
+        [some((self.squares / n).sqrt()), some(self.largest), some(self.total / n), some(self.total_norm / n)]
     }
 }
 
@@ -154,7 +163,8 @@ pub fn predict(
         }
         dropped += block.chunk.dropped;
     }
-    let ([rms_m, max_m, mean_m], [rms_rad, max_rad, mean_rad]) = (lengths.figures(), angles.figures());
+    let [rms_m, max_m, mean_m, mean_abs_m] = lengths.figures();
+    let [rms_rad, max_rad, mean_rad, mean_abs_rad] = angles.figures();
     let samples = lengths.count.max(angles.count);
     Ok(Prediction {
         samples,
@@ -162,9 +172,11 @@ pub fn predict(
         rms_m,
         max_m,
         mean_m,
+        mean_abs_m,
         rms_rad,
         max_rad,
         mean_rad,
+        mean_abs_rad,
         extrapolated_samples: extrapolated,
         unseen_directions: unseen,
     })
@@ -198,6 +210,15 @@ impl<'a> Path<'a> {
         self.at += 1;
         Ok(self.now.as_ref().map_or(Moment::Still, |stretch| Moment::At(stretch, self.at - 1)))
     }
+}
+
+/// The chain of the recording's set-up, with constant deviations alone.
+pub(crate) fn chain(calibrated: &CalibratedMachine, header: &Header, sensor: &Sensor) -> Result<Chain<f64>> {
+    let (previous_from_w, dh) = frame_of_w(calibrated, header, sensor)?;
+    let mut chain = Chain::new(calibrated.machine(), &dh);
+    let w = calibrated.machine().w_index();
+    chain.set_previous_from_frame(w, previous_from_w * Pose::exp(dh[w]));
+    Ok(chain)
 }
 
 /// Frame `w` of the recording's set-up in the frame before it, and the deviations that go with it.
@@ -235,7 +256,7 @@ fn missing(what: String, known: &[&str]) -> Error {
     Error::Undetermined { what, mend: format!("add --fit-setup to find it from this recording{known}") }
 }
 
-fn sensor_state(
+pub(crate) fn sensor_state(
     calibrated: &CalibratedMachine,
     header: &Header,
     sensor: &Sensor,

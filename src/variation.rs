@@ -49,6 +49,9 @@ pub struct Varying {
     pub terms: Vec<Term>,
 }
 
+/// Nothing varies.
+pub(crate) static CONSTANT: Varying = Varying { directions: None, terms: Vec::new() };
+
 impl Varying {
     /// The feature of every part of every term, in their order.
     pub fn features(&self) -> impl Iterator<Item = &Feature> {
