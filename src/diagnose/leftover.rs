@@ -26,8 +26,7 @@ pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Le
             let kept: Vec<f64> = run.iter().filter(|r| !out[**r]).map(|r| residual[*r]).collect();
             for block in kept.chunks_exact(length) {
                 let sum: f64 = block.iter().sum();
-                // What a single wild reading does is no structure.
-                excess += (sum * sum / length as f64 - 1.0).min(400.0 * length as f64);
+                excess += sum * sum / length as f64 - 1.0;
                 count += 1;
             }
         }

@@ -286,9 +286,15 @@ impl<'a> Rows<'a> {
     }
 
     /// Evidence at a single point, finely.
-    pub fn score_at(&self, candidate: &Candidate, parameters: &[f64], field: &Field) -> Option<Score> {
+    pub fn score_at(
+        &self,
+        candidate: &Candidate,
+        parameters: &[f64],
+        field: &Field,
+        heat: f64,
+    ) -> Option<Score> {
         let single = Candidate { grid: vec![parameters.to_vec()], ..candidate.clone() };
-        self.score(&single, field, 1.0)
+        self.score(&single, field, heat)
     }
 
     /// Fills the table at these points of the grid.

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::leftover::{Leftover, measure};
-use super::score::{Rows, Score};
+use super::score::{Field, Rows, Score};
 use super::space::Space;
 use crate::effects::Candidate;
 
@@ -37,6 +37,9 @@ pub(super) struct Search<'a> {
     pub progress: &'a dyn Fn(&str),
 }
 
+/// Candidates with this part of the best one's weight come into question, and at most so many.
+const CLOSE: f64 = 0.6;
+const REFINED: usize = 8;
 /// Coefficients of effects that are taken in may be this many times the usual size.
 pub(super) const ROOM: f64 = 4.0;
 /// More effects are not looked for.
@@ -56,7 +59,17 @@ impl Search<'_> {
                 Some(Rival { candidate: i, weight: score.evidence + priors[i], score })
             })
             .collect();
-        rivals.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let better_first = |a: &Rival, b: &Rival| b.weight.total_cmp(&a.weight);
+        rivals.sort_by(better_first);
+        // Between the points of its grid a candidate may be much better: those that come into question are refined.
+        let near = rivals.first().map_or(0.0, |best| best.weight * CLOSE);
+        let close = rivals.iter().take_while(|r| r.weight >= near && r.weight > 0.0).count().min(REFINED);
+        let refined: Vec<Rival> = rivals[..close]
+            .par_iter()
+            .map(|r| refine(rows, &candidates[r.candidate], r, &field, heat))
+            .collect();
+        rivals.splice(..close, refined);
+        rivals.sort_by(better_first);
         rivals
     }
 
@@ -73,40 +86,11 @@ impl Search<'_> {
     }
 
     /// Takes a rival in, at its best point.
-    pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
-        let score = self.refine(rival, space);
+    pub fn enter(&self, rival: &Rival) -> Option<Active> {
+        let score = rival.score.clone();
         let columns = self.rows.of(&self.candidates[rival.candidate], &score.parameters)?;
         let columns = columns.columns(0, score.coefficients) * ROOM;
         Some(Active { candidate: rival.candidate, score, columns })
-    }
-
-    /// Moves the parameters between the points of the grid to where the evidence is greatest.
-    fn refine(&self, rival: &Rival, space: &Space) -> Score {
-        let candidate = &self.candidates[rival.candidate];
-        let field = self.rows.field(space.clone());
-        let at = |parameters: &[f64]| self.rows.score_at(candidate, parameters, &field);
-        let mut best = rival.score.clone();
-        best.at_best = at(&best.parameters).map_or(best.at_best, |s| s.at_best);
-        for (p, parameter) in candidate.parameters.iter().enumerate() {
-            if !parameter.smooth {
-                continue;
-            }
-            let mut step = spacing(candidate, p, best.parameters[p]);
-            for _ in 0..6 {
-                step *= 0.5;
-                for sign in [-1.0, 1.0] {
-                    let mut moved = best.parameters.clone();
-                    moved[p] += sign * step;
-                    if moved[p] < parameter.range.0 || moved[p] > parameter.range.1 {
-                        continue;
-                    }
-                    if let Some(score) = at(&moved).filter(|s| s.at_best > best.at_best) {
-                        best = Score { evidence: best.evidence, ..score };
-                    }
-                }
-            }
-        }
-        best
     }
 
     /// Forward with full comparison, and after each step every effect against all others in its place.
@@ -116,8 +100,25 @@ impl Search<'_> {
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let space = self.beside(&active, None);
             let rivals = self.rivals(&space, 1.0);
+            if std::env::var("KINCAL_TRACE").is_ok() {
+                for r in rivals.iter().take(4) {
+                    let c = &self.candidates[r.candidate];
+                    eprintln!(
+                        "step {}: {} @ {:?} weight {:.1} gain {:.1} {:?} k={}",
+                        active.len(),
+                        c.effect,
+                        c.place,
+                        r.weight,
+                        r.score.gain,
+                        r.score.parameters,
+                        r.score.coefficients
+                    );
+                }
+                let l = self.leftover(&space);
+                eprintln!("   left energy {:.0} beyond {:.1} heat {:.2}", l.energy, l.beyond, l.heat);
+            }
             let Some(best) = rivals.first().filter(|r| r.weight > ENTER) else { break };
-            let Some(entered) = self.enter(best, &space) else { break };
+            let Some(entered) = self.enter(best) else { break };
             active.push(entered);
             if active.len() > 1 {
                 self.swap(&mut active);
@@ -141,7 +142,7 @@ impl Search<'_> {
                         continue;
                     }
                     Some(best) => {
-                        if let Some(entered) = self.enter(best, &space) {
+                        if let Some(entered) = self.enter(best) {
                             changed |= best.candidate != active[i].candidate;
                             active[i] = entered;
                         }
@@ -154,6 +155,38 @@ impl Search<'_> {
             }
         }
     }
+}
+
+/// Moves the parameters between the points of the grid to where the evidence is greatest; the evidence over the grid grows alike.
+fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
+    let at = |parameters: &[f64]| rows.score_at(candidate, parameters, field, heat);
+    let mut best = rival.score.clone();
+    let start = best.at_best;
+    for round in 0..2 {
+        for (p, parameter) in candidate.parameters.iter().enumerate().filter(|(_, p)| p.smooth) {
+            let mut step = 0.5f64.powi(2 * round) * spacing(candidate, p, best.parameters[p]);
+            for _ in 0..5 {
+                step *= 0.5;
+                for sign in [-1.0, 1.0] {
+                    let mut moved = best.parameters.clone();
+                    moved[p] += sign * step;
+                    if moved[p] < parameter.range.0 || moved[p] > parameter.range.1 {
+                        continue;
+                    }
+                    if let Some(score) = at(&moved).filter(|s| s.at_best > best.at_best) {
+                        best = Score { evidence: best.evidence, ..score };
+                        break;
+                    }
+                }
+            }
+        }
+        if candidate.parameters.len() < 2 {
+            break;
+        }
+    }
+    let grown = best.at_best - start;
+    best.evidence += grown;
+    Rival { candidate: rival.candidate, weight: rival.weight + grown, score: best }
 }
 
 /// Distance to the next point of the grid.
