@@ -88,7 +88,7 @@ pub struct Follow<'a, I> {
     ended: bool,
 }
 
-/// Histories of all joints.
+/// Histories of all joints, `docs/effects.md` (43).
 struct History {
     /// Dyad, drive, dead band (m or rad), direction of the first motion.
     joints: Vec<(usize, Drive, f64, i8)>,
