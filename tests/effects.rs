@@ -271,6 +271,29 @@ fn what_recordings_do_not_have_is_told() {
 }
 
 #[test]
+fn a_last_digit_that_flickers_at_a_standstill_is_no_reversal() {
+    let machine = common::machine("linear_axis");
+    let name = &machine.commands()[0];
+    let mut text = format!("# measurement: joint\nt[s],{name}[mm],{name}_meas[mm]\n");
+    for k in 0..300 {
+        let q = match k {
+            0..100 => f64::from(k) * 0.5,
+            100..200 => 50.0 + 1e-6 * f64::from(k % 2),
+            _ => 50.0 + f64::from(k - 200) * 0.4,
+        };
+        text += &format!("{:.2},{q:.6},{q:.6}\n", f64::from(k) * 0.01);
+    }
+    let recordings = [Recording::from_bytes("f.csv", text.into_bytes(), &machine).expect("a recording")];
+    let facts = RecordingFacts::of(&machine, &recordings).expect("facts");
+    assert!(!facts.settled);
+    let samples = samples_of(&recordings[0], &machine, &facts.dead_bands).expect("samples");
+    let j = machine.joints().next().expect("a joint").0;
+    assert!((facts.dead_bands[j] - 9e-8).abs() < 1e-9, "{:?}", facts.dead_bands);
+    let joint = samples[0].joints[j].as_ref().expect("a joint");
+    assert!(joint.direction.iter().all(|d| *d == 1.0));
+}
+
+#[test]
 fn a_family_left_out_is_gone_and_an_unknown_one_is_told() {
     let library = Library::standard().without("backlash").expect("it is there");
     assert!(library.family("backlash").is_none());

@@ -93,13 +93,18 @@ impl RecordingFacts {
                     let (from, to) = own[j].unwrap_or((q, q));
                     own[j] = Some((from.min(q), to.max(q)));
                 }
-                // The first chunk says what the steps are like.
-                if steps.len() < 4096
-                    && let Some(last) = last.replace(displacements.clone())
-                {
-                    let times = chunk.time.as_ref().map_or(0.0, |t| t[k] - t[k - 1]);
-                    steps
-                        .push((times, displacements.iter().zip(&last).map(|(a, b)| (a - b).abs()).collect()));
+                if let Some(last) = last.replace(displacements.clone()) {
+                    let step: Vec<f64> =
+                        displacements.iter().zip(&last).map(|(a, b)| (a - b).abs()).collect();
+                    for (least, step) in
+                        self.dead_bands.iter_mut().zip(&step).filter(|(_, step)| **step > 0.0)
+                    {
+                        *least = least.min(*step);
+                    }
+                    // The first samples say what the usual steps are.
+                    if steps.len() < 4096 {
+                        steps.push((chunk.time.as_ref().map_or(0.0, |t| t[k] - t[k - 1]), step));
+                    }
                 }
             }
             if let (Some(first), Some(last)) =
