@@ -288,7 +288,7 @@ fn a_last_digit_that_flickers_at_a_standstill_is_no_reversal() {
     assert!(!facts.settled);
     let samples = samples_of(&recordings[0], &machine, &facts.dead_bands).expect("samples");
     let j = machine.joints().next().expect("a joint").0;
-    assert!((facts.dead_bands[j] - 9e-8).abs() < 1e-9, "{:?}", facts.dead_bands);
+    assert!((facts.dead_bands[j] - 1.5e-9).abs() < 1e-12, "{:?}", facts.dead_bands);
     let joint = samples[0].joints[j].as_ref().expect("a joint");
     assert!(joint.direction.iter().all(|d| *d == 1.0));
 }

@@ -29,7 +29,7 @@ pub struct RecordingFacts {
 /// A joint that moves by less stands still, m or rad: what is left of rounded commands is no motion.
 const STANDSTILL: f64 = 1e-6;
 /// Least and greatest dead band as a share of the range of travel; between them it is one and a half of the smallest steps.
-const JITTER: (f64, f64) = (1e-6, 1e-4);
+const JITTER: (f64, f64) = (1e-9, 1e-4);
 /// Samples are settled positions where the median step of the joint that moves most is above this share of its range.
 const SETTLED_STEP: f64 = 0.05;
 
