@@ -46,8 +46,8 @@ pub fn diagnose(
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis> {
     progress("fitting constant geometry");
-    let linear = linear(machine, recordings, request.options, progress)?;
     let facts = RecordingFacts::of(machine, recordings)?;
+    let linear = linear(machine, recordings, request.options, &facts.dead_bands, progress)?;
     let candidates = library.candidates(machine, &facts);
     let runs = noise::runs(&linear);
     let out = noise::outliers(&linear, &linear.residual, &runs);

@@ -14,6 +14,7 @@ mod grid;
 mod identified;
 mod library;
 mod quantity;
+mod scan;
 
 pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Place, Skipped, Slot};
 pub use facts::RecordingFacts;

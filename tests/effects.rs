@@ -271,6 +271,29 @@ fn what_recordings_do_not_have_is_told() {
 }
 
 #[test]
+fn a_last_digit_that_flickers_at_a_standstill_is_no_reversal() {
+    let machine = common::machine("linear_axis");
+    let name = &machine.commands()[0];
+    let mut text = format!("# measurement: joint\nt[s],{name}[mm],{name}_meas[mm]\n");
+    for k in 0..300 {
+        let q = match k {
+            0..100 => f64::from(k) * 0.5,
+            100..200 => 50.0 + 1e-6 * f64::from(k % 2),
+            _ => 50.0 + f64::from(k - 200) * 0.4,
+        };
+        text += &format!("{:.2},{q:.6},{q:.6}\n", f64::from(k) * 0.01);
+    }
+    let recordings = [Recording::from_bytes("f.csv", text.into_bytes(), &machine).expect("a recording")];
+    let facts = RecordingFacts::of(&machine, &recordings).expect("facts");
+    assert!(!facts.settled);
+    let samples = samples_of(&recordings[0], &machine, &facts.dead_bands).expect("samples");
+    let j = machine.joints().next().expect("a joint").0;
+    assert!((facts.dead_bands[j] - 1.5e-9).abs() < 1e-12, "{:?}", facts.dead_bands);
+    let joint = samples[0].joints[j].as_ref().expect("a joint");
+    assert!(joint.direction.iter().all(|d| *d == 1.0));
+}
+
+#[test]
 fn a_family_left_out_is_gone_and_an_unknown_one_is_told() {
     let library = Library::standard().without("backlash").expect("it is there");
     assert!(library.family("backlash").is_none());
@@ -299,12 +322,12 @@ fn centred(mut column: Vec<f64>) -> Vec<f64> {
 fn neighbouring_points_of_every_grid_look_alike() {
     let library = Library::standard();
     let machine = common::machine("ac_table_tilting");
-    let (facts, samples) = prepared(&machine, 1500);
+    let (facts, samples) = prepared(&machine, 4000);
     let mut judged = 0;
     for candidate in &library.candidates(&machine, &facts).all {
         let forms = &library.families()[candidate.family].parameters;
-        // Of a large grid, every hundredth pair or so.
-        let stride = 1 + candidate.grid.len() / 100;
+        // Of a large grid, some sixty pairs.
+        let stride = 1 + candidate.grid.len() / 60;
         for pair in candidate.grid.windows(2).step_by(stride) {
             // Neighbours differ in one parameter; a step in the outer one of two is judged by the inner ones around it.
             let differs: Vec<usize> = (0..forms.len()).filter(|i| pair[0][*i] != pair[1][*i]).collect();
@@ -336,6 +359,32 @@ fn neighbouring_points_of_every_grid_look_alike() {
 }
 
 #[test]
+fn a_scan_of_the_grid_has_the_columns_of_each_point() {
+    let library = Library::standard();
+    let machine = common::machine("ac_table_tilting");
+    let (facts, samples) = prepared(&machine, 150);
+    for candidate in &library.candidates(&machine, &facts).all {
+        let mut next = 0;
+        candidate.scan(&samples, |index, columns| {
+            assert_eq!(index, next);
+            next += 1;
+            // Every seventh point, and those around the seams of the blocks.
+            if index % 7 != 0 && index % 64 > 1 {
+                return;
+            }
+            for (column, feature) in columns.iter().zip(&candidate.features) {
+                let direct = feature.over(&samples, &candidate.grid[index]);
+                let largest = direct.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                for (a, b) in column.iter().zip(&direct) {
+                    assert!((a - b).abs() <= 1e-11 * largest, "{} {index}: {a} {b}", candidate.effect);
+                }
+            }
+        });
+        assert_eq!(next, candidate.grid.len());
+    }
+}
+
+#[test]
 #[ignore = "a measurement, for release builds: cargo test --release --test effects how_long -- --ignored --nocapture"]
 fn how_long_all_columns_take() {
     let library = Library::standard();
@@ -349,12 +398,10 @@ fn how_long_all_columns_take() {
     let mut slowest = Vec::new();
     for candidate in &candidates.all {
         let before = std::time::Instant::now();
-        for point in &candidate.grid {
-            for feature in &candidate.features {
-                sum += feature.over(&samples, point)[100];
-                columns += 1;
-            }
-        }
+        candidate.scan(&samples, |_, found| {
+            sum += found.iter().map(|column| column[100]).sum::<f64>();
+            columns += found.len();
+        });
         slowest.push((before.elapsed(), candidate.effect.clone(), candidate.place, candidate.grid.len()));
     }
     println!("{columns} columns of 7000 samples in {:?} (sum {sum:.3})", start.elapsed());

@@ -407,7 +407,7 @@ impl<'a> Rows<'a> {
             return None;
         }
         for (pair, features) in candidate.features.chunks_exact(2).enumerate() {
-            let (phase, other) = (features[0].phase()?, features[1].phase()?);
+            let ((_, phase), (_, other)) = (features[0].wave()?, features[1].wave()?);
             if phase != other {
                 return None;
             }

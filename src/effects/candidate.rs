@@ -106,7 +106,7 @@ pub struct Parameter {
     pub smooth: bool,
 }
 
-/// A family at one place: columns of a regression.
+/// A family at one place: columns of a regression, `docs/effects.md` (40).
 ///
 /// The deviation is `Σ coefficients c · Σ parts direction · feature(sample; parameters)`. Evaluate each of `features` once for
 /// each point of `grid` ([`Feature::over`], [`Feature::with_derivatives`]); coefficients only multiply.

@@ -26,10 +26,10 @@ pub struct RecordingFacts {
     pub readings: Vec<Quantity>,
 }
 
-/// A joint that moves by less stands still, m or rad.
-const STANDSTILL: f64 = 1e-9;
-/// Share of the range of travel below which motion against the direction of travel is jitter.
-const JITTER: f64 = 1e-6;
+/// A joint that moves by less stands still, m or rad: what is left of rounded commands is no motion.
+const STANDSTILL: f64 = 1e-6;
+/// Least and greatest dead band as a share of the range of travel; between them it is one and a half of the smallest steps.
+const JITTER: (f64, f64) = (1e-9, 1e-4);
 /// Samples are settled positions where the median step of the joint that moves most is above this share of its range.
 const SETTLED_STEP: f64 = 0.05;
 
@@ -42,7 +42,8 @@ impl RecordingFacts {
         let dyads = machine.dyads().len();
         let mut facts = RecordingFacts {
             travel: vec![None; dyads],
-            dead_bands: vec![0.0; dyads],
+            // Smallest steps, until all recordings are read.
+            dead_bands: vec![f64::INFINITY; dyads],
             time: None,
             longest: 0.0,
             step: None,
@@ -70,8 +71,10 @@ impl RecordingFacts {
         if !all_timed {
             (facts.time, facts.step, facts.longest) = (None, None, 0.0);
         }
-        facts.dead_bands =
-            (facts.travel.iter()).map(|t| t.map_or(0.0, |(from, to)| JITTER * (to - from))).collect();
+        for (band, travel) in facts.dead_bands.iter_mut().zip(&facts.travel) {
+            let range = travel.map_or(0.0, |(from, to)| to - from);
+            *band = (1.5 * *band).max(JITTER.0 * range).min(JITTER.1 * range);
+        }
         Ok(facts)
     }
 
@@ -82,7 +85,7 @@ impl RecordingFacts {
         let mut span: Option<(f64, f64)> = None;
         for chunk in recording.chunks()? {
             let chunk = chunk?;
-            let mut last: Option<Vec<f64>> = None;
+            let mut last: Option<Vec<f64>> = None; // rows of a chunk; a step from one chunk to the next is left out
             for (k, q) in chunk.commands.chunks_exact(commands).enumerate() {
                 let displacements = machine.displacements(q);
                 for (j, _) in machine.joints() {
@@ -90,13 +93,18 @@ impl RecordingFacts {
                     let (from, to) = own[j].unwrap_or((q, q));
                     own[j] = Some((from.min(q), to.max(q)));
                 }
-                // The first chunk says what the steps are like.
-                if steps.len() < 4096
-                    && let Some(last) = last.replace(displacements.clone())
-                {
-                    let times = chunk.time.as_ref().map_or(0.0, |t| t[k] - t[k - 1]);
-                    steps
-                        .push((times, displacements.iter().zip(&last).map(|(a, b)| (a - b).abs()).collect()));
+                if let Some(last) = last.replace(displacements.clone()) {
+                    let step: Vec<f64> =
+                        displacements.iter().zip(&last).map(|(a, b)| (a - b).abs()).collect();
+                    for (least, step) in
+                        self.dead_bands.iter_mut().zip(&step).filter(|(_, step)| **step > 0.0)
+                    {
+                        *least = least.min(*step);
+                    }
+                    // The first samples say what the usual steps are.
+                    if steps.len() < 4096 {
+                        steps.push((chunk.time.as_ref().map_or(0.0, |t| t[k] - t[k - 1]), step));
+                    }
                 }
             }
             if let (Some(first), Some(last)) =
@@ -115,7 +123,7 @@ impl RecordingFacts {
         }
         self.settled |=
             recording.columns().iter().any(|c| matches!(c.role, crate::recording::Role::Direction(_)));
-        let moving = |j: usize| own[j].map(|(from, to)| to - from).filter(|range| *range > STANDSTILL);
+        let moving = |j: usize| own[j].map(|(from, to)| to - from).filter(|range| *range > 10.0 * STANDSTILL);
         let largest = (machine.joints())
             .filter_map(|(j, _)| Some(median(steps.iter().map(|(_, s)| s[j])) / moving(j)?))
             .fold(0.0, f64::max);

@@ -95,7 +95,7 @@ impl Identified<'_> {
         }
     }
 
-    /// To first order, by differences of a thousandth of each standard uncertainty.
+    /// `docs/effects.md` (49): to first order, by differences of a thousandth of each standard uncertainty.
     fn errors(
         &self,
         samples: &[Samples],

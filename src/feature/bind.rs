@@ -170,14 +170,14 @@ impl Feature {
         feature
     }
 
-    /// What stands inside, if it is a sine or a cosine.
-    pub fn phase(&self) -> Option<Feature> {
-        match &self.node {
-            Node::Function(Function::Sin | Function::Cos, inner) if self.memories == 0 => {
-                Some(Feature::of((**inner).clone()))
-            }
-            _ => None,
-        }
+    /// What it is the sine (`false`) or cosine (`true`) of, if it is one and has no history.
+    pub fn wave(&self) -> Option<(bool, Feature)> {
+        let (cosine, inner) = match &self.node {
+            Node::Function(Function::Sin, inner) => (false, inner),
+            Node::Function(Function::Cos, inner) => (true, inner),
+            _ => return None,
+        };
+        (self.memories == 0).then(|| (cosine, Feature::of((**inner).clone())))
     }
 
     /// Whether its derivative by parameter `index` says how it changes: not where that parameter stands inside a step or sign.

@@ -22,7 +22,7 @@ pub enum Expression {
     Velocity,
     /// Acceleration of the own joint.
     Acceleration,
-    /// Distance of the own joint from its last reversal.
+    /// Distance of the own joint from its last reversal, 1e6 before the first one.
     SinceReversal,
     /// Path that the own joint has travelled since the first sample of the recording.
     Travelled,

@@ -9,6 +9,8 @@ use crate::machine::{Branch, Drive, JointKind, Machine};
 use crate::motion::{Axis, LOOK_AHEAD, Rates, stated};
 use crate::recording::{Chunk, Recording};
 
+/// Distance from a reversal that has not been, m or rad: finite, so that derivatives of what decays with it are 0.
+const FAR: f64 = 1e6;
 /// Standard acceleration of gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
 
@@ -34,7 +36,7 @@ pub struct JointSamples {
     pub position: Vec<f64>,
     /// Direction of travel or approach: -1, 1; 0 for a joint that never moves.
     pub direction: Vec<f64>,
-    /// Distance from the last reversal, m or rad.
+    /// Distance from the last reversal, m or rad; 1e6 before the first one.
     pub since_reversal: Vec<f64>,
     /// Path since the first sample of the recording, m or rad.
     pub travelled: Vec<f64>,
@@ -138,11 +140,13 @@ pub struct Follow<'a, I> {
     ended: bool,
 }
 
-/// Histories of all joints.
+/// Histories of all joints, `docs/effects.md` (43).
 struct History {
     /// Dyad, drive, dead band (m or rad), direction of the first motion.
     joints: Vec<(usize, Drive, f64, i8)>,
     axes: Vec<Option<Axis>>,
+    /// Whether the joint has turned round yet.
+    turned: Vec<bool>,
     travelled: Vec<f64>,
     last: Vec<f64>,
 }
@@ -155,7 +159,13 @@ impl History {
             })
             .collect();
         let count = joints.len();
-        History { joints, axes: vec![None; count], travelled: vec![0.0; count], last: vec![f64::NAN; count] }
+        History {
+            joints,
+            axes: vec![None; count],
+            turned: vec![false; count],
+            travelled: vec![0.0; count],
+            last: vec![f64::NAN; count],
+        }
     }
 
     fn advance(&mut self, chunk: &Chunk, k: usize, displacements: &[f64]) {
@@ -166,7 +176,10 @@ impl History {
                 [(c, factor)] => stated(chunk, *c, k).map(|d| if *factor < 0.0 { -d } else { d }),
                 _ => None,
             };
-            self.axes[i].get_or_insert_with(|| Axis::at(q)).advance(q, stated, *band);
+            let axis = self.axes[i].get_or_insert_with(|| Axis::at(q));
+            let before = axis.direction;
+            axis.advance(q, stated, *band);
+            self.turned[i] |= before != 0 && before != axis.direction;
             if self.last[i].is_finite() {
                 self.travelled[i] += (q - self.last[i]).abs();
             }
@@ -182,7 +195,10 @@ impl History {
     }
 
     fn since_reversal(&self, i: usize, q: f64) -> f64 {
-        self.axes[i].map_or(0.0, |axis| (q - axis.turned_at).abs())
+        match &self.axes[i] {
+            Some(axis) if self.turned[i] => (q - axis.turned_at).abs(),
+            _ => FAR,
+        }
     }
 }
 

@@ -5,7 +5,6 @@ use nalgebra::DMatrix;
 
 use super::evaluator::Moment;
 use super::source::{Known, Sources};
-use super::stretch::by_dyad;
 use super::unknowns::{Layout, Unknowns};
 use super::{
     Evaluator, Fit, Found, Info, Model, Options, Placed, Problem, calibrated, enough_for_setups,
@@ -67,11 +66,12 @@ const GENEROUS: f64 = 3.0;
 /// Set-ups that nothing is known of: m and rad.
 const FREE: f64 = 10.0;
 
-/// Calibrates with constant deviations and takes the rows there.
+/// Calibrates with constant deviations and takes the rows there; `dead_bands` by dyad, m or rad.
 pub(crate) fn linear(
     machine: &Machine,
     recordings: &[Recording],
     options: Options,
+    dead_bands: &[f64],
     progress: &dyn Fn(&str),
 ) -> Result<Linear> {
     let (varying, model) = (Varying::default(), Model::default());
@@ -92,10 +92,10 @@ pub(crate) fn linear(
     let information = Info::new(&found.solution.normal.matrix, &layout, problem.prior, open);
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
     progress("taking rows");
-    rows(machine, &sources, &found, fit)
+    rows(machine, &sources, &found, fit, dead_bands)
 }
 
-fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit) -> Result<Linear> {
+fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[f64]) -> Result<Linear> {
     let unknowns = &found.solution.unknowns;
     let dyads = machine.dyads().len();
     let stride = sources.samples().div_ceil(MOST_SAMPLES).max(1);
@@ -121,7 +121,6 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit) -> Result
     let width = 6 * dyads + 6 * (several - 1) + extras;
     linear.constant = DMatrix::zeros(count, width);
     let w = machine.w_index();
-    let bands = by_dyad(machine, &sources.dead_bands);
     for source in &sources.all {
         let evaluator = Evaluator::new(machine, unknowns, source);
         let mut work = evaluator.workspace();
@@ -131,8 +130,8 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit) -> Result
         let first_sample = linear.lines.len();
         let mut number = 0u64;
         let options = FollowOptions {
-            dead_bands: bands.clone(),
-            first_directions: first_directions(machine, &bands, source.recording.chunks()?)?,
+            dead_bands: bands.to_vec(),
+            first_directions: first_directions(machine, bands, source.recording.chunks()?)?,
             pause_after: source.summary.pause_after.unwrap_or(f64::INFINITY),
             gravity_w: source.recording.header().gravity_w,
             channels: source.recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
