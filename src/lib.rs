@@ -31,6 +31,7 @@
 //! | [`CalibratedMachine`] | a machine file with its deviations |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
+//! | [`inverse`] | commands that bring the tool to a pose, for any chain |
 //! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known |
 //!
 //! # A complete example
@@ -75,6 +76,7 @@ pub mod describe;
 mod document;
 pub mod error;
 pub mod identify;
+pub mod inverse;
 pub mod lie;
 pub mod location;
 pub mod machine;
