@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod check;
+mod compensate;
 mod demo;
 mod describe;
 mod location;
@@ -30,6 +31,8 @@ enum Command {
     Calibrate(calibrate::Args),
     /// What a calibrated machine says the instrument would read, sample by sample
     Predict(predict::Args),
+    /// The NC program with corrected axis words, everything else as it was
+    Compensate(compensate::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
     Demo(demo::Args),
 }
@@ -52,6 +55,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Predict(args) => predict::run(&args),
+        Command::Compensate(args) => compensate::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     match outcome {

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::compensate::CompensateFault;
 use crate::machine::MachineFault;
 use crate::nc::NcFault;
 use crate::recording::RecordingFault;
@@ -74,6 +75,14 @@ pub enum Error {
         /// What is wrong.
         fault: Box<NcFault>,
     },
+    /// An NC program that cannot be corrected as it stands.
+    #[error("{place}: {fault}")]
+    Compensate {
+        /// Where in the program.
+        place: Place,
+        /// Why not.
+        fault: Box<CompensateFault>,
+    },
     /// A text in RON that cannot be read at all.
     #[error("{place}: {message}")]
     Ron {
@@ -109,6 +118,7 @@ impl Error {
             Error::Machine { fault, .. } => fault.mend(),
             Error::Recording { fault, .. } => fault.mend(),
             Error::Nc { fault, .. } => fault.mend(),
+            Error::Compensate { fault, .. } => fault.mend(),
             Error::Ron { mend, .. } | Error::Undetermined { mend, .. } => mend.clone(),
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
@@ -123,6 +133,7 @@ impl Error {
             Error::Machine { place, .. }
             | Error::Recording { place, .. }
             | Error::Nc { place, .. }
+            | Error::Compensate { place, .. }
             | Error::Ron { place, .. } => Some(place),
             Error::File { .. } | Error::Undetermined { .. } => None,
         }

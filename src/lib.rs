@@ -32,6 +32,7 @@
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
 //! | [`inverse`] | commands that bring the tool to a pose, for any chain |
+//! | [`mod@compensate`] | NC programs rewritten so that the actual machine cuts what they mean |
 //! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known |
 //!
 //! # A complete example
@@ -71,6 +72,7 @@
 mod calibration;
 pub mod chain;
 pub mod check;
+pub mod compensate;
 pub mod demo;
 pub mod describe;
 mod document;
