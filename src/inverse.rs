@@ -38,11 +38,13 @@ pub struct Options {
     pub position_m: f64,
     /// Largest angle from the goal that counts as reached, rad.
     pub angle_rad: f64,
+    /// Whether travel is respected.
+    pub within_travel: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { weak: 0.02, steps: 60, position_m: 1e-10, angle_rad: 1e-10 }
+        Options { weak: 0.02, steps: 60, position_m: 1e-10, angle_rad: 1e-10, within_travel: true }
     }
 }
 
@@ -328,7 +330,7 @@ impl<'a> Inverse<'a> {
                 (low - q).max(q - high)
             };
             let out = (0..count)
-                .filter(|c| free[*c])
+                .filter(|c| free[*c] && self.options.within_travel)
                 .map(|c| (c, beyond(solution.commands[c], c)))
                 .filter(|(_, by)| *by > 1e-12)
                 .max_by(|a, b| a.1.total_cmp(&b.1));

@@ -205,6 +205,14 @@ fn notes(r: &Report) -> String {
             lines(&r.reversals, |x| x.line)
         );
     }
+    if r.cycles > 0 {
+        let _ = writeln!(
+            text,
+            "note: {} corrected in the plane only, which leaves {} at most",
+            count(r.cycles, "drilling cycle", "drilling cycles"),
+            at(r.largest_cycle_m, length)
+        );
+    }
     if r.out_of_travel.count > 0 {
         let joints: std::collections::BTreeSet<&str> =
             r.out_of_travel.first.iter().map(|o| o.joint.as_str()).collect();

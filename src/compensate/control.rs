@@ -37,8 +37,10 @@ pub(super) struct Control<'a> {
     pub length: f64,
     /// Length of the tool that is in the spindle, m.
     pub tip_length: f64,
-    /// Direction of the tool length: component of the tip.
+    /// Normal of the plane: component of the tip.
     pub normal: usize,
+    /// Direction in which the control counts the tool length: component of the tip.
+    pub length_axis: usize,
     /// The program's own frame, before [`Frame`], in `w`; tool centre point function on.
     w_from_program: Pose<f64>,
 }
@@ -66,7 +68,8 @@ impl<'a> Control<'a> {
         // The order in which people write them: X Y Z first.
         axes.sort_by_key(|a| (a.tip.map_or(3, |k| k), a.address.clone()));
         let count = axes.len();
-        let exact = Options { position_m: 1e-9, ..Options::default() };
+        // What the program means is asked here, not whether the machine can.
+        let exact = Options { within_travel: false, ..Options::default() };
         let mut control = Control {
             machine,
             setup,
@@ -80,6 +83,7 @@ impl<'a> Control<'a> {
             length: 0.0,
             tip_length: setup.reference_length(),
             normal: 2,
+            length_axis: 2,
             w_from_program: Pose::identity(0.0),
         };
         control.set_offset(None);
@@ -108,12 +112,14 @@ impl<'a> Control<'a> {
         }
     }
 
-    pub fn set_plane(&mut self, plane: Option<Plane>) {
+    /// `length_follows`: whether the tool length goes with the plane (Siemens) or stays with Z.
+    pub fn set_plane(&mut self, plane: Option<Plane>, length_follows: bool) {
         self.normal = match plane {
             None | Some(Plane::Xy) => 2,
             Some(Plane::Zx) => 1,
             Some(Plane::Yz) => 0,
         };
+        self.length_axis = if length_follows { self.normal } else { 2 };
     }
 
     /// Takes a work offset into force, by name; false where the set-up does not have it.
@@ -192,7 +198,7 @@ impl<'a> Control<'a> {
             match axis.tip {
                 Some(_) if self.tcp => free[c] = true,
                 Some(k) => {
-                    let length = if k == self.normal { self.length } else { 0.0 };
+                    let length = if k == self.length_axis { self.length } else { 0.0 };
                     q[c] = sign * (p.0[k] + self.offset[i] + length);
                 }
                 None => q[c] = sign * (program[i] + self.offset[i] + self.frame.shift[i]),
@@ -219,7 +225,7 @@ impl<'a> Control<'a> {
             let lacking = self.frame.pose.transform(self.triple(other));
             for (i, axis) in self.axes.iter().enumerate() {
                 if let Some(k) = axis.tip {
-                    let length = if k == self.normal { self.length } else { 0.0 };
+                    let length = if k == self.length_axis { self.length } else { 0.0 };
                     p[k] = match axis.command {
                         Some((c, sign)) => sign * q[c] - self.offset[i] - length,
                         None => lacking.0[k],

@@ -78,16 +78,16 @@ impl Follower<'_> {
         match solution.outcome {
             Outcome::OutOfTravel { command, by } => {
                 let joint = self.machine.commands()[command].clone();
-                self.report.out_of_travel.push(OutOfTravel { line, joint, by });
+                self.report.out_of_travel.push_once(OutOfTravel { line, joint, by }, line);
             }
             Outcome::Singular { lost_w } => {
                 let lost_w = lost_w.to_array();
                 let left_rad = solution.angle_left_rad;
-                self.report.singular.push(SingularBlock { line, lost_w, left_rad });
+                self.report.singular.push_once(SingularBlock { line, lost_w, left_rad }, line);
             }
             Outcome::Unreachable if all_free && solution.position_left_m > 1e-9 => {
                 let (left_m, left_rad) = (solution.position_left_m, solution.angle_left_rad);
-                self.report.unreachable.push(Unreached { line, left_m, left_rad });
+                self.report.unreachable.push_once(Unreached { line, left_m, left_rad }, line);
             }
             _ => {}
         }
@@ -230,9 +230,12 @@ impl Follower<'_> {
 
     /// Takes a corrected position as reached.
     pub fn arrive(&mut self, line: usize, meant: Position, written: Position) {
-        let left = self.error(&written.q, &meant.q);
-        self.report.largest_left_m.take(left.m, line);
-        self.report.largest_left_rad.take(left.rad, line);
+        // Where an axis stands at a place of the machine, the tip is nowhere that matters.
+        if self.status.iter().all(|s| *s != Status::Parked) {
+            let left = self.error(&written.q, &meant.q);
+            self.report.largest_left_m.take(left.m, line);
+            self.report.largest_left_rad.take(left.rad, line);
+        }
         let t_from_tip = self.control.tip();
         let at = |q: &[f64]| self.control.nominal.w_from_t(q) * t_from_tip;
         let correction = Left::between(at(&written.q), at(&meant.q));

@@ -12,8 +12,8 @@ pub enum CompensateFault {
         /// As written.
         text: String,
     },
-    /// An increment from a place that is not known.
-    #[error("increment of `{address}` from a place that the program has not said")]
+    /// An increment or a preset from a place that is not known.
+    #[error("`{address}` counts from a place that the program has not said")]
     UnknownStart {
         /// Address of the axis.
         address: String,

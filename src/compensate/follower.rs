@@ -55,6 +55,8 @@ pub(super) struct Follower<'a> {
     /// Motion in force by what has been written.
     pub written_motion: Option<MotionKind>,
     pub report: Report,
+    /// The cycle that a Siemens program calls behind every block that moves.
+    modal_cycle: Option<String>,
     /// `G90.1`: centres of arcs are absolute.
     pub absolute_centre: bool,
     tool: Tool,
@@ -118,6 +120,7 @@ impl<'a> Follower<'a> {
             last: None,
             written_motion: None,
             report: Report { machine: machine.name().to_string(), ..Report::default() },
+            modal_cycle: None,
             absolute_centre: false,
             tool: Tool::default(),
             tool_fault: None,
@@ -174,7 +177,9 @@ impl<'a> Follower<'a> {
         if step.changes_frame {
             self.frame(block)?;
         }
-        if step.calls {
+        self.modal_cycle(block);
+        let drills = self.state.modes().modal_call && self.modal_cycle.as_deref().is_some_and(is_drilling);
+        if step.calls && !(drills && step.motion.is_some()) {
             self.called(block)?;
         }
         let to_reference = [28.0, 28.1, 30.0, 30.1, 27.0, 29.0];
@@ -247,7 +252,7 @@ impl<'a> Follower<'a> {
             }
         }
         if now.plane != before.plane {
-            self.control.set_plane(now.plane);
+            self.control.set_plane(now.plane, self.dialect == Dialect::Siemens);
             changed = true;
         }
         if now.work_offset != before.work_offset
@@ -369,14 +374,39 @@ impl<'a> Follower<'a> {
         }
     }
 
+    /// `MCALL CYCLE81(...)`.
+    fn modal_cycle(&mut self, block: &Block) {
+        let mut tokens = block.tokens().iter();
+        if tokens.any(|t| t.kind == Kind::Name && block.name(t) == "MCALL") {
+            let called = tokens.next().map(|t| block.text(&t.span).to_ascii_uppercase());
+            self.modal_cycle =
+                called.map(|text| text.split('(').next().unwrap_or_default().trim().to_string());
+        }
+    }
+
     /// A call that is left alone leaves every axis somewhere.
     fn called(&mut self, block: &Block) -> Result<()> {
         let name = super::calls::name_of(block);
+        if self.dialect == Dialect::Siemens && is_drilling(&name) {
+            self.leave_normal();
+            self.report.cycles += 1;
+            return Ok(());
+        }
         if !self.control.setup.leaves_alone(&name) {
             return refuse(block, 0, CompensateFault::Call { what: name });
         }
         self.status.iter_mut().filter(|s| **s == Status::Placed).for_each(|s| *s = Status::Parked);
         Ok(())
+    }
+
+    /// The axis of the tool length is behind a cycle wherever the cycle leaves it.
+    pub fn leave_normal(&mut self) {
+        let normal = self.control.normal;
+        for (axis, status) in self.control.axes.iter().zip(&mut self.status) {
+            if axis.tip == Some(normal) && *status == Status::Placed {
+                *status = Status::Parked;
+            }
+        }
     }
 
     /// Axes named (all, if none is) stand at a reference point.
@@ -415,21 +445,20 @@ impl<'a> Follower<'a> {
         if self.control.tcp && !self.control.can_tcp() {
             return refuse(block, 0, CompensateFault::NoTcp);
         }
-        let tilted = !self.control.frame.is_straight() && !self.control.frame.keeps(self.control.normal);
+        let tilted = !self.control.frame.is_straight() && !self.control.frame.keeps(self.control.length_axis);
         if !self.control.tcp && tilted && self.control.length != 0.0 {
             let what = "a tilted frame without tool centre point function".to_string();
             return refuse(block, 0, CompensateFault::Frame { what });
+        }
+        if motion.kind == MotionKind::Cycle || self.state.modes().modal_call {
+            return self.cycle(block, motion, target, out);
         }
         match motion.kind {
             MotionKind::Rapid | MotionKind::Linear | MotionKind::Unstated => {
                 self.straight(block, motion, target, out)
             }
             MotionKind::ArcCw | MotionKind::ArcCcw => self.arc(block, motion, target, out),
-            MotionKind::Cycle => {
-                let what = format!("the cycle `{}`", line_text(block));
-                refuse(block, 0, CompensateFault::OtherMotion { what })
-            }
-            MotionKind::Other => {
+            MotionKind::Cycle | MotionKind::Other => {
                 let what = format!("the motion `{}`", line_text(block));
                 refuse(block, 0, CompensateFault::OtherMotion { what })
             }
@@ -549,6 +578,12 @@ impl<'a> Follower<'a> {
         }
         report
     }
+}
+
+/// Drilling cycles of Siemens: what they do lies on the tool axis at the place of the block.
+fn is_drilling(name: &str) -> bool {
+    let number = name.strip_prefix("CYCLE").and_then(|n| n.parse::<u32>().ok());
+    matches!(number, Some(81..=89 | 840))
 }
 
 /// A block that cannot be written is told by whoever owns the output.

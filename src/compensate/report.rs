@@ -12,15 +12,26 @@ pub struct Listed<T> {
     pub count: u64,
     /// The first of them.
     pub first: Vec<T>,
+    /// Line of the last.
+    #[serde(skip)]
+    last: usize,
 }
 
 impl<T> Default for Listed<T> {
     fn default() -> Self {
-        Listed { count: 0, first: Vec::new() }
+        Listed { count: 0, first: Vec::new(), last: 0 }
     }
 }
 
 impl<T> Listed<T> {
+    /// One entry per line.
+    pub(super) fn push_once(&mut self, entry: T, line: usize) {
+        if self.last != line {
+            self.last = line;
+            self.push(entry);
+        }
+    }
+
     pub(super) fn push(&mut self, entry: T) {
         self.count += 1;
         if self.first.len() < MOST_LISTED {
@@ -111,6 +122,10 @@ pub struct Report {
     pub arc_lines: u64,
     /// Straight moves that were subdivided.
     pub split_moves: u64,
+    /// Drilling cycles: their places are corrected in the plane, their depths are not.
+    pub cycles: u64,
+    /// Largest error of the tip that this leaves.
+    pub largest_cycle_m: Worst,
     /// Largest displacement of the tip by the correction.
     pub largest_correction_m: Worst,
     /// Largest turn of the tool axis by the correction.

@@ -5,13 +5,15 @@ use std::io::Write;
 use super::arc::Arc;
 use super::correct::plain;
 use super::fault::CompensateFault;
-use super::follower::{Follower, Position, Status, put, put_bytes, refuse};
+use super::follower::{Follower, Position, Status, line_text, put, put_bytes, refuse};
 use crate::error::Result;
-use crate::nc::{Block, Dialect, Motion, MotionKind};
+use crate::nc::{Block, Dialect, Distance, Motion, MotionKind};
 
 /// Parts of a straight move at which it is looked at.
 const LOOKS: [f64; 3] = [0.25, 0.5, 0.75];
-/// Most lines that take the place of one block.
+/// Most parts of a straight move.
+const MOST_PARTS: usize = 4096;
+/// Most lines that take the place of one arc.
 const MOST_LINES: usize = 100_000;
 
 /// Whether an M word acts when the block's motion is over.
@@ -47,15 +49,15 @@ impl Follower<'_> {
             && known
             && self.dialect != Dialect::Heidenhain
         {
-            // What a single line would leave, and so how many it takes: it shrinks with the square of their length.
-            let single = self.correct(line, &end.q, Some(block), &motion.words);
-            let left = self.mid_line((&meant, &end), (&written, &single.written));
-            if left > tolerance {
-                let count = ((left / tolerance).sqrt() * 1.1).ceil() as usize;
+            let (from, to) = (meant.program.clone(), end.program.clone());
+            let at = |s: f64| -> Vec<f64> { from.iter().zip(&to).map(|(a, b)| a + (b - a) * s).collect() };
+            let mut count = 1;
+            while count < MOST_PARTS && self.unsplit(&at, count) > tolerance {
+                count *= 2;
+            }
+            if count > 1 {
                 self.report.split_moves += 1;
-                let (from, to) = (meant.program.clone(), end.program.clone());
-                let at = |s: f64| from.iter().zip(&to).map(|(a, b)| a + (b - a) * s).collect();
-                return self.lines(block, motion, count.min(MOST_LINES), &at, None, out);
+                return self.lines(block, motion, count, &at, None, out);
             }
         }
         let correction = self.correct(line, &end.q, Some(block), &motion.words);
@@ -67,6 +69,66 @@ impl Follower<'_> {
         }
         self.arrive(line, end, correction.written);
         put(block, out)
+    }
+
+    /// A drilling cycle at the place of the block: its place is corrected in the plane, its depths and its angles stay.
+    pub fn cycle(
+        &mut self,
+        block: &mut Block,
+        motion: &Motion,
+        mut target: Vec<f64>,
+        out: &mut dyn Write,
+    ) -> Result<()> {
+        let line = block.line();
+        let repeated = block.words().iter().any(|w| matches!(w.address.as_str(), "L" | "K"));
+        if self.state.modes().distance == Some(Distance::Incremental) || repeated {
+            let what = format!("the cycle `{}`", line_text(block));
+            return refuse(block, 0, CompensateFault::OtherMotion { what });
+        }
+        let normal = self.control.normal;
+        let in_plane: Vec<bool> =
+            self.control.axes.iter().map(|a| a.tip.is_some_and(|k| k != normal)).collect();
+        for i in (0..target.len()).filter(|i| !in_plane[*i]) {
+            target[i] = self.meant.program[i];
+        }
+        let q = self.joints(block, &target)?;
+        self.advance(line, &q);
+        let before = self.written.program.clone();
+        let mut correction = self.correct(line, &q, Some(block), &motion.words);
+        correction.numbers.retain(|n| in_plane[n.axis]);
+        for i in (0..before.len()).filter(|i| !in_plane[*i]) {
+            correction.written.program[i] = before[i];
+        }
+        correction.written.q = self.joints(block, &correction.written.program)?;
+        self.apply(block, &motion.words, &correction.numbers)?;
+        let left = self.error(&correction.written.q, &q);
+        self.report.largest_cycle_m.take(left.m, line);
+        self.report.cycles += 1;
+        self.meant = Position { q, program: target };
+        self.written = correction.written;
+        self.written_motion = Some(motion.kind);
+        self.leave_normal();
+        put(block, out)
+    }
+
+    /// Largest error of the tip, m, that a straight move leaves in `count` equal parts, rounding aside.
+    fn unsplit(&self, at: &dyn Fn(f64) -> Vec<f64>, count: usize) -> f64 {
+        let free = self.free();
+        let corrected = |s: f64| -> Option<(Position, Position)> {
+            let program = at(s);
+            let q = self.control.joints(&program, &self.meant.q)?;
+            let sent = self.inverse.solve(self.model.chain(), &self.goal(&q), &q, &free).commands;
+            let written = Position { program: self.control.program(&sent, &program), q: sent };
+            Some((Position { q, program }, written))
+        };
+        let mut worst = 0.0f64;
+        let Some(mut from) = corrected(0.0) else { return worst };
+        for k in 1..=count {
+            let Some(to) = corrected(k as f64 / count as f64) else { return worst };
+            worst = worst.max(self.mid_line((&from.0, &to.0), (&from.1, &to.1)));
+            from = to;
+        }
+        worst
     }
 
     /// Largest error of the tip between the ends of a straight move, m.
