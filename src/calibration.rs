@@ -37,6 +37,8 @@ pub(crate) struct CalibrationForm {
     lengths: Vec<LengthForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     seen: Vec<SeenForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    unseen: Option<Vec<Vec<DeviationForm>>>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -97,6 +99,8 @@ pub struct CalibratedMachine {
     pub(crate) zeros: Vec<(String, String, f64)>,
     pub(crate) lengths: Vec<(String, f64)>,
     seen: Vec<Option<(f64, f64)>>,
+    /// Patterns of deviations that may be there as well.
+    pub(crate) unseen: Option<Vec<Vec<Twist<f64>>>>,
     samples: u64,
     rms: Rms,
 }
@@ -113,6 +117,7 @@ impl CalibratedMachine {
             zeros: Vec::new(),
             lengths: Vec::new(),
             seen: vec![None; commands],
+            unseen: None,
             samples: 0,
             rms: Rms::default(),
         }
@@ -191,6 +196,12 @@ impl CalibratedMachine {
         self.seen[command]
     }
 
+    /// What the recordings have not seen of tip and tool axis: patterns of deviations (one twist per dyad, machine order, m and
+    /// rad), each one standard deviation long and independent of the others. `None` where the file does not say.
+    pub fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
+        self.unseen.as_deref()
+    }
+
     /// Whether a vector of commands leaves what the calibration has seen by more than 1 % of the range of any joint.
     pub fn extrapolates(&self, commands: &[f64]) -> bool {
         commands.iter().zip(&self.seen).any(|(q, seen)| {
@@ -235,19 +246,34 @@ impl CalibratedMachine {
             }
             Ok(Vec3([x, y, z].map(|c| unit.to_si(c))))
         };
-        for (i, deviation) in form.deviations.iter().enumerate() {
-            let path = format!("calibration.deviations[{i}]");
-            let Some(j) = self.machine.frame_index(&deviation.frame) else {
-                let frames: Vec<&str> = self.machine.dyads().iter().map(|d| d.frame.as_str()).collect();
-                let fault =
-                    MachineFault::UnknownFrame { frame: deviation.frame.clone(), known: frames.join(", ") };
-                return Err((format!("{path}.frame"), fault));
-            };
-            self.deviations[j] = Twist::new(
-                place(format!("{path}.v"), deviation.v, units.length)?,
-                place(format!("{path}.w"), deviation.w, units.angle)?,
-            );
-        }
+        let deviations = |path: &str, forms: &[DeviationForm], into: &mut [Twist<f64>]| {
+            for (i, deviation) in forms.iter().enumerate() {
+                let path = format!("{path}[{i}]");
+                let Some(j) = self.machine.frame_index(&deviation.frame) else {
+                    let frames: Vec<&str> = self.machine.dyads().iter().map(|d| d.frame.as_str()).collect();
+                    let fault = MachineFault::UnknownFrame {
+                        frame: deviation.frame.clone(),
+                        known: frames.join(", "),
+                    };
+                    return Err((format!("{path}.frame"), fault));
+                };
+                into[j] = Twist::new(
+                    place(format!("{path}.v"), deviation.v, units.length)?,
+                    place(format!("{path}.w"), deviation.w, units.angle)?,
+                );
+            }
+            Ok(())
+        };
+        let mut found = self.deviations.clone();
+        deviations("calibration.deviations", &form.deviations, &mut found)?;
+        let pattern = |(i, pattern): (usize, &Vec<DeviationForm>)| {
+            let mut twists = vec![Twist::zero(0.0); self.machine.dyads().len()];
+            deviations(&format!("calibration.unseen[{i}]"), pattern, &mut twists)?;
+            Ok(twists)
+        };
+        let unseen = form.unseen.as_ref().map(|all| all.iter().enumerate().map(pattern).collect());
+        let unseen = unseen.transpose()?;
+        (self.deviations, self.unseen) = (found, unseen);
         for (i, setup) in form.setups.iter().enumerate() {
             let path = format!("calibration.setups[{i}]");
             let placement = Placement {
@@ -298,13 +324,21 @@ impl CalibratedMachine {
     pub fn to_ron(&self) -> String {
         let units = self.machine.units();
         let mut form = self.machine.to_form();
-        let deviations = (self.machine.dyads().iter().zip(&self.deviations))
-            .map(|(dyad, dh)| DeviationForm {
+        let write = |twists: &[Twist<f64>]| -> Vec<DeviationForm> {
+            let one = |(dyad, dh): (&crate::machine::Dyad, &Twist<f64>)| DeviationForm {
                 frame: dyad.frame.clone(),
                 v: in_unit(dh.v, units.length),
                 w: in_unit(dh.w, units.angle),
-            })
-            .collect();
+            };
+            self.machine.dyads().iter().zip(twists).map(one).collect()
+        };
+        let deviations = write(&self.deviations);
+        let pattern = |twists: &Vec<Twist<f64>>| -> Vec<DeviationForm> {
+            let mut forms = write(twists);
+            forms.retain(|d| d.v != (0.0, 0.0, 0.0) || d.w != (0.0, 0.0, 0.0));
+            forms
+        };
+        let unseen = self.unseen.as_ref().map(|all| all.iter().map(pattern).collect());
         let place = |(name, pose): &(String, Pose<f64>)| PlaceForm {
             name: name.clone(),
             at: in_unit(pose.translation, units.length),
@@ -338,6 +372,7 @@ impl CalibratedMachine {
                 })
                 .collect(),
             seen: seen.collect(),
+            unseen,
         });
         to_text(&form)
     }

@@ -12,6 +12,7 @@ mod solve;
 mod source;
 mod thin;
 mod unknowns;
+mod unseen;
 
 pub use fit::{BeforeAfter, COMPONENTS, Combination, Fit, ParameterFit, RecordingFit, SetupFit, Suspect};
 pub use information::{Functional, Information};
@@ -109,7 +110,8 @@ pub fn calibrate_with_progress(
     let found = settle(&problem, options.solver, placed.unknowns, noise)?;
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
     let information = Info::new(&found.solution.normal.matrix, &layout, prior, open);
-    let calibrated = calibrated(machine, &sources, &found);
+    let mut calibrated = calibrated(machine, &sources, &found);
+    calibrated.unseen = Some(unseen::unseen(machine, &layout, &information));
     let fit = fit::report(&problem, &nominal, &found, information, options)?;
     Ok((calibrated, fit))
 }
