@@ -45,7 +45,10 @@ use std::path::Path;
 
 pub use fault::CompensateFault;
 pub use model::Model;
-pub use report::{Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, Unreached, Worst};
+pub use report::{
+    Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, Unreached, Unseen, UnseenPattern,
+    Worst,
+};
 pub use setup::{Setup, ToolAxis};
 
 use crate::calibration::CalibratedMachine;
@@ -93,9 +96,7 @@ pub fn compensate(
         Program::new(path, BufReader::new(file))
     };
     let mut model = model::of_machine(calibrated);
-    let mut report = run(calibrated.machine(), &mut *model, &open, setup, options, out)?;
-    report.unseen = None;
-    Ok(report)
+    run(calibrated.machine(), &mut *model, &open, setup, options, out)
 }
 
 /// As [`compensate`], from a text to a text; `file` is only the name that messages use.

@@ -218,6 +218,8 @@ fn a_measured_machine_cuts_what_its_corrected_program_means() {
                 report.singular.count
             );
             assert_eq!(report.moves as usize, path.len(), "{name}");
+            let unseen = report.unseen.expect("the calibrated file says so");
+            assert!(unseen.tip_m < 1e-6 && unseen.axis_rad < 5e-6, "{name}: {unseen:?}");
             assert_eq!((report.out_of_travel.count, report.unreachable.count), (0, 0), "{name}");
             assert!(after.0 < 0.05 * before.0, "{name} tcp {tcp}: tip {before:?} to {after:?}");
             assert!(after.1 < 0.1 * before.1, "{name} tcp {tcp}: axis {before:?} to {after:?}");
@@ -259,5 +261,82 @@ fn corrected_positions_are_those_of_the_inverse() {
         for (a, b) in solution.commands.iter().zip(&sent) {
             assert!((a - b).abs() < 3e-8, "{name}: {a} {b}");
         }
+    }
+}
+
+/// Joint commands with the tip on a sphere about the workpiece's zero, the rotary joints going to and fro.
+fn on_a_sphere(machine: &Machine, radius: f64, count: usize, shift: f64) -> Vec<Vec<f64>> {
+    let inverse = Inverse::new(machine).with_mode(Mode::Position);
+    let nominal = Chain::nominal(machine);
+    let free: Vec<bool> = (0..5).map(|c| machine.command_joint(c).kind == JointKind::Prismatic).collect();
+    let mut q = vec![0.0; 5];
+    (0..count)
+        .map(|k| {
+            let s = std::f64::consts::TAU * k as f64 / count as f64 + shift;
+            let mut turn = 0.0;
+            for c in (0..5).filter(|c| !free[*c]) {
+                let (low, high) = machine.travel(c);
+                turn += 1.0;
+                q[c] = if high - low < 10.0 { 0.6 + 0.4 * (2.0 * s).sin() } else { 2.0 * (s + turn).sin() };
+            }
+            let (out, up) = ((3.0 * s).cos(), 0.9 + 0.5 * (2.0 * s + shift).sin());
+            let n = [up.cos() * (s * 2.0).cos(), up.cos() * (s * 2.0).sin() * out.signum(), up.sin()];
+            let w_from_tip = Pose::translation(Vec3(n).times(radius));
+            let goal = Goal { t_from_tip: Pose::identity(0.0), w_from_tip };
+            inverse.solve(&nominal, &goal, &q, &free).commands
+        })
+        .collect()
+}
+
+#[test]
+fn one_ballbar_corrects_what_it_sees_and_the_report_says_what_it_does_not() {
+    for (k, (name, machine)) in five_axis().into_iter().enumerate() {
+        let actual = CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(
+            &machine,
+            1.0,
+            300 + k as u64,
+        ));
+        let paths = [0.0, 1.3].map(|shift| on_a_sphere(&machine, 0.1, 300, shift));
+        let bar = Instrument::new(Sensor::Distance { absolute: true }, 2e-7, 0.0);
+        let texts: Vec<String> = paths
+            .iter()
+            .enumerate()
+            .map(|(i, path)| recording(&actual, &bar, path, &[], 5 + i as u64))
+            .collect();
+        let calibrated = calibrated_from(&machine, &texts);
+        let path = &paths[0];
+        let text = program(&machine, path, true);
+        let (corrected, report) =
+            compensate_text(&calibrated, "path.nc", &text, &setup(&machine, true), &Options::default())
+                .unwrap_or_else(|e| panic!("{name}: {e}"));
+        let along = |sent: Vec<Vec<f64>>| {
+            let chain = actual.chain();
+            let off = path.iter().zip(&sent).map(|(q, sent)| {
+                let (wanted, is) = (meant(&machine, q).translation, chain.w_from_t(sent).translation);
+                (is.norm() - wanted.norm()).powi(2)
+            });
+            (off.sum::<f64>() / path.len() as f64).sqrt()
+        };
+        let (before, after) =
+            (along(execute(&machine, &text, true)), along(execute(&machine, &corrected, true)));
+        let (tip, axis) = errors(&machine, &actual.chain(), path, &execute(&machine, &corrected, true));
+        let unseen = report.unseen.expect("the calibrated file says so");
+        println!(
+            "{name}: along the bar {:.2} -> {:.3} um; left {:.1} um, {:.1} urad; told as unseen {:.1} um, {:.1} urad in {} patterns, first {:?}",
+            before * 1e6,
+            after * 1e6,
+            tip * 1e6,
+            axis * 1e6,
+            unseen.tip_m * 1e6,
+            unseen.axis_rad * 1e6,
+            unseen.patterns.len(),
+            unseen.patterns[0].mostly
+        );
+        assert!(after < 0.05 * before, "{name}: {before} to {after}");
+        // A distance to one point leaves six combinations of a five-axis machine open, (22).
+        assert!(unseen.patterns.len() >= 6, "{name}: {}", unseen.patterns.len());
+        // What is left is of the size that was told.
+        assert!(tip < 3.0 * unseen.tip_m && tip > unseen.tip_m / 5.0, "{name}: {tip} {unseen:?}");
+        assert!(axis < 3.0 * unseen.axis_rad && axis > unseen.axis_rad / 5.0, "{name}: {axis} {unseen:?}");
     }
 }

@@ -255,10 +255,27 @@ fn notes(r: &Report) -> String {
             r.never_programmed.join(", ")
         );
     }
-    if let Some(unseen) = &r.unseen {
-        for line in unseen {
-            let _ = writeln!(text, "note: {line}");
+    match &r.unseen {
+        Some(unseen) if !unseen.patterns.is_empty() => {
+            let _ = writeln!(
+                text,
+                "not seen by the calibration, and left (one standard deviation): tip {}, tool axis {}",
+                length(unseen.tip_m),
+                angle(unseen.axis_rad)
+            );
+            for p in unseen.patterns.iter().take(5) {
+                let (tip, axis) = (length(p.tip_m), angle(p.axis_rad));
+                let _ = writeln!(text, "  along {}: tip {tip}, tool axis {axis}", p.mostly.join(" "));
+            }
+            if unseen.patterns.len() > 5 {
+                let _ = writeln!(text, "  and {} more", unseen.patterns.len() - 5);
+            }
         }
+        Some(_) => {}
+        None if r.corrected_words + r.inserted_words > 0 => {
+            text.push_str("note: the calibrated file does not say what its recordings have not seen\n");
+        }
+        None => {}
     }
     text
 }

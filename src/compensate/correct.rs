@@ -1,10 +1,12 @@
 //! One position corrected, `docs/compensate.md` (37) to (39), and the numbers that say so in the block.
 
 use super::follower::{Follower, Position, Status};
-use super::report::{OutOfTravel, Reversal, SingularBlock, Unreached};
+use super::report::{OutOfTravel, Reversal, SingularBlock, Unreached, Unseen, UnseenPattern};
 use crate::error::Result;
+use crate::identify::COMPONENTS;
 use crate::inverse::{Goal, Outcome};
-use crate::lie::Pose;
+use crate::lie::{Pose, Twist, Vec3};
+use crate::machine::Machine;
 use crate::nc::{Block, Dialect, Distance, How, Number, Word};
 
 /// A number to write for an axis.
@@ -241,7 +243,48 @@ impl Follower<'_> {
         let correction = Left::between(at(&written.q), at(&meant.q));
         self.report.largest_correction_m.take(correction.m, line);
         self.report.largest_correction_rad.take(correction.rad, line);
+        self.look_at_unseen(&written.q);
         (self.meant, self.written) = (meant, written);
+    }
+
+    /// (42): what each unseen pattern would do to tip and axis here.
+    fn look_at_unseen(&mut self, q: &[f64]) {
+        let Some(patterns) = self.model.unseen().filter(|p| !p.is_empty()) else { return };
+        let sweep = self.control.nominal.sweep(q);
+        let w_from_tip = sweep.w_from_t() * self.control.tip();
+        let axis = w_from_tip.rotation.column(2);
+        self.unseen.resize(patterns.len(), Left::default());
+        self.unseen_moves += 1;
+        for (sum, pattern) in self.unseen.iter_mut().zip(patterns) {
+            // (1): the error twist of the tool, seen from the workpiece.
+            let zero = Vec3([0.0; 3]);
+            let mut twist = Twist::new(zero, zero);
+            for (j, dh) in pattern.iter().enumerate() {
+                let w_from_frame = sweep.b_from_w().inverse() * sweep.b_from_frame(j);
+                twist = twist + w_from_frame.carry_twist(*dh).times(self.machine.branch(j).sign());
+            }
+            let tip = twist.v + twist.w.cross(w_from_tip.translation);
+            sum.m += tip.dot(tip);
+            sum.rad += twist.w.cross(axis).norm().powi(2);
+        }
+    }
+
+    /// What the patterns did over all moves, largest first.
+    pub fn unseen_report(&self) -> Option<Unseen> {
+        let patterns = self.model.unseen()?;
+        let mean = |sum: f64| (sum / self.unseen_moves.max(1) as f64).sqrt();
+        let total = |of: fn(&Left) -> f64| mean(self.unseen.iter().map(of).sum());
+        let mut listed: Vec<UnseenPattern> = (self.unseen.iter().zip(patterns))
+            .map(|(sum, pattern)| UnseenPattern {
+                mostly: mostly(self.machine, pattern),
+                tip_m: mean(sum.m),
+                axis_rad: mean(sum.rad),
+            })
+            .collect();
+        // A turn counts with a lever of 0.1 m.
+        let size = |p: &UnseenPattern| p.tip_m.hypot(0.1 * p.axis_rad);
+        listed.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        Some(Unseen { tip_m: total(|l| l.m), axis_rad: total(|l| l.rad), patterns: listed })
     }
 
     /// The joints at a part `s` of a straight move, as the control moves them.
@@ -254,6 +297,20 @@ impl Follower<'_> {
         }
         self.control.joints(&mix(&a.program, &b.program), &q)
     }
+}
+
+/// The largest components of a pattern, in units of their tolerances.
+fn mostly(machine: &Machine, pattern: &[Twist<f64>]) -> Vec<String> {
+    let mut parts: Vec<(f64, String)> = Vec::new();
+    for (j, twist) in pattern.iter().enumerate() {
+        let sizes = twist.to_array().into_iter().zip(machine.tolerance(j).to_array());
+        for (name, (value, tolerance)) in COMPONENTS.iter().zip(sizes) {
+            parts.push(((value / tolerance).abs(), format!("{}.{name}", machine.dyads()[j].frame)));
+        }
+    }
+    parts.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let least = 0.5 * parts.first().map_or(0.0, |p| p.0);
+    parts.into_iter().take(3).filter(|p| p.0 > least).map(|p| p.1).collect()
 }
 
 /// The number of a word.

@@ -4,6 +4,7 @@
 use std::io::Write;
 
 use super::control::Control;
+use super::correct::Left;
 use super::fault::CompensateFault;
 use super::frame::{self, Change, has_g};
 use super::model::Model;
@@ -55,6 +56,9 @@ pub(super) struct Follower<'a> {
     /// Motion in force by what has been written.
     pub written_motion: Option<MotionKind>,
     pub report: Report,
+    /// Sums of squares over moves of what the unseen patterns would do.
+    pub unseen: Vec<Left>,
+    pub unseen_moves: u64,
     /// The cycle that a Siemens program calls behind every block that moves.
     modal_cycle: Option<String>,
     /// `G90.1`: centres of arcs are absolute.
@@ -120,6 +124,8 @@ impl<'a> Follower<'a> {
             last: None,
             written_motion: None,
             report: Report { machine: machine.name().to_string(), ..Report::default() },
+            unseen: Vec::new(),
+            unseen_moves: 0,
             modal_cycle: None,
             absolute_centre: false,
             tool: Tool::default(),
@@ -567,7 +573,9 @@ impl<'a> Follower<'a> {
 
     /// The report of what was followed.
     pub fn finish(self) -> Report {
+        let unseen = self.unseen_report();
         let mut report = self.report;
+        report.unseen = unseen;
         let never = self.control.axes.iter().zip(&self.status);
         report.never_programmed = never
             .filter(|(axis, status)| axis.command.is_some() && **status == Status::Never)

@@ -2,6 +2,7 @@
 
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
+use crate::lie::Twist;
 
 /// A machine that is told where it is sent, one commanded position after the other.
 ///
@@ -25,6 +26,11 @@ pub trait Model {
 
     /// Forgets every position told, as at the start of a program.
     fn restart(&mut self);
+
+    /// Deviations that may be there as well, as [`CalibratedMachine::unseen`].
+    fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
+        None
+    }
 }
 
 /// The model of a calibrated machine.
@@ -58,4 +64,8 @@ impl Model for Constant<'_> {
     }
 
     fn restart(&mut self) {}
+
+    fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
+        self.calibrated.unseen()
+    }
 }

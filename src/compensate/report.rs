@@ -152,6 +152,30 @@ pub struct Report {
     pub extrapolated_moves: u64,
     /// Addresses that the program never names; their joints were taken where they stand at the start, and left there.
     pub never_programmed: Vec<String>,
-    /// What the calibration has not seen of the errors of tip and axis, in words; `None` where that is not known.
-    pub unseen: Option<Vec<String>>,
+    /// What the calibration has not seen of the errors of tip and tool axis at the ends of these moves; `None` where that is not
+    /// known.
+    pub unseen: Option<Unseen>,
+}
+
+/// Errors of tip and tool axis that may be left because no recording has shown them. Root mean squares over the moves, one
+/// standard deviation.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Unseen {
+    /// Of the tip, m.
+    pub tip_m: f64,
+    /// Of the tool axis, rad.
+    pub axis_rad: f64,
+    /// The deviations behind it, largest first.
+    pub patterns: Vec<UnseenPattern>,
+}
+
+/// One combination of deviations that no recording has shown.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct UnseenPattern {
+    /// Its largest components, in units of their tolerances: `c.vx`.
+    pub mostly: Vec<String>,
+    /// Of the tip, m.
+    pub tip_m: f64,
+    /// Of the tool axis, rad.
+    pub axis_rad: f64,
 }
