@@ -1,6 +1,6 @@
 //! Inverse kinematics of any chain: position only, position and tool axis, or the full pose.
 //!
-//! Newton steps from a warm start, `docs/compensate.md` (29) to (32). Orientation comes first, by the directions that the joints
+//! Newton steps from a warm start, `docs/compensate.md` (C1) to (C4). Orientation comes first, by the directions that the joints
 //! still have; position follows with what that leaves free. A direction in which the joints hardly move the tool is
 //! held near the start instead of being chased, so that a correction stays small at a singular pose, and is told.
 
@@ -144,7 +144,7 @@ impl Directions {
         self.parts.iter().map(|(_, _, s)| *s).fold(0.0, f64::max)
     }
 
-    /// (31): along each direction the step that closes the error; a weak one is drawn back by `from_start`.
+    /// (C3): along each direction the step that closes the error; a weak one is drawn back by `from_start`.
     fn step(&self, error: &DVector<f64>, from_start: &DVector<f64>, weak: f64) -> DVector<f64> {
         let mut step = DVector::zeros(from_start.len());
         for (u, v, s) in &self.parts {
@@ -410,7 +410,7 @@ impl<'a> Inverse<'a> {
         (gap, look.turn_w.norm())
     }
 
-    /// (30) to (32).
+    /// (C2) to (C4).
     fn step(&self, look: &Look, q: &[f64], start: &[f64], free: &[bool]) -> DVector<f64> {
         let from_start = DVector::from_iterator(q.len(), q.iter().zip(start).map(|(q, s)| q - s));
         let weak = self.options.weak;

@@ -301,6 +301,33 @@ fn drilling_cycles_are_corrected_in_their_plane() {
     assert!(lines[2].starts_with('X') && !lines[2].contains('Z'), "{out}");
 }
 
+#[test]
+fn other_controls_are_written_in_their_own_way() {
+    let calibrated = erroneous("ac_table_tilting", 1.0);
+    let (machine, actual) = (calibrated.machine(), calibrated.chain());
+    let heidenhain = "0 BEGIN PGM T MM\n1 L X+0,5 Y-10 Z+20 A+40 C+0 R0 FMAX M3\n2 L X+30 F500\n3 L IY-5,25 IC+10\n4 M30\n5 END PGM T MM\n";
+    let siemens = "G710 G90\nN10 G0 X=0.5 Y-10 Z20 A=AC(40) C=DC(0)\nN20 G1 X=IC(29.5) F500\nN30 Y=IC(-5.25) C=ACP(10)\nM30\n";
+    for text in [heidenhain, siemens] {
+        let (out, report) = run(&calibrated, text, &Options::default());
+        assert_eq!(report.moves, 3);
+        let (meant, sent) = (targets(text, &AXES), targets(&out, &AXES));
+        for (meant, sent) in meant.iter().zip(&sent) {
+            // 0 may be written as nearly a turn.
+            let mut sent = sent.clone();
+            sent[4] -= 360.0 * ((sent[4] - meant[4]) / 360.0).round();
+            assert!(tip_error(&actual, machine, meant, &sent) < 1e-6, "{out}");
+        }
+        assert!(out.contains("M30\n") && out.lines().count() == text.lines().count(), "{out}");
+    }
+    let (out, _) = run(&calibrated, heidenhain, &Options::default());
+    assert!(
+        out.contains("L X+29,996 Y-9,768 F500") && out.contains(" R0 FMAX M3") && out.contains("IC+"),
+        "{out}"
+    );
+    let (out, _) = run(&calibrated, siemens, &Options::default());
+    assert!(out.contains("X=IC(29.") && out.contains("A=AC(") && out.contains("C=DC("), "{out}");
+}
+
 /// Deviations for a growing first joint and others for a shrinking one.
 struct TwoPieces {
     chains: [Chain<f64>; 2],
@@ -459,9 +486,9 @@ fn real_part_programs_go_through() {
     for name in ["keychain", "axis_cross"] {
         let Some(path) = common::shared(&format!("data/spinner-u5-nc/{name}.mpf")) else { return };
         let text = std::fs::read_to_string(path).expect("readable");
-        let options = Options { arcs: Some(2e-6), ..Options::default() };
+        let options = Options { arcs: Some(5e-6), ..Options::default() };
         let (out, report) = with_setup(&calibrated, &text, setup, &options);
-        assert!(report.split_arcs > 50 && report.largest_arc_m.value <= 2e-6, "{name}: {report:?}");
+        assert!(report.split_arcs > 50 && report.largest_arc_m.value <= 5e-6, "{name}: {report:?}");
         assert!(report.largest_left_m.value < 2e-6, "{name}: {:?}", report.largest_left_m);
         // What is no motion stays as it was.
         let still = |text: &str| -> Vec<String> {

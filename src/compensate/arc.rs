@@ -1,4 +1,4 @@
-//! Arcs and helices as the program means them, `docs/compensate.md` (40).
+//! Arcs and helices as the program means them, `docs/compensate.md` (C12).
 
 use std::f64::consts::TAU;
 
@@ -118,7 +118,7 @@ impl Arc {
         Ok(Arc { start: start.to_vec(), end: end.to_vec(), plane, centre, radius: [r0, r1], from, sweep })
     }
 
-    /// Program coordinates at a part `s` of it; (40).
+    /// Program coordinates at a part `s` of it; (C12).
     pub fn at(&self, s: f64) -> Vec<f64> {
         let mut p: Vec<f64> = self.start.iter().zip(&self.end).map(|(a, b)| a + (b - a) * s).collect();
         if s < 1.0 {

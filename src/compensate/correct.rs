@@ -1,4 +1,4 @@
-//! One position corrected, `docs/compensate.md` (37) to (39), and the numbers that say so in the block.
+//! One position corrected, `docs/compensate.md` (C9) to (C11), and the numbers that say so in the block.
 
 use super::follower::{Follower, Position, Status};
 use super::report::{OutOfTravel, Reversal, SingularBlock, Unreached, Unseen, UnseenPattern};
@@ -51,7 +51,10 @@ impl Follower<'_> {
     /// Tells the model where the program goes; where that changes the piece, the step of the correction is told.
     pub fn advance(&mut self, line: usize, q: &[f64]) {
         self.model.advance(q);
-        self.report.extrapolated_moves += u64::from(self.model.extrapolates(q));
+        if self.extrapolated != line && self.model.extrapolates(q) {
+            self.extrapolated = line;
+            self.report.extrapolated_moves += 1;
+        }
         let Some((meant, sent, piece)) = self.last.take() else { return };
         if piece != self.model.piece() {
             let free = self.free();
@@ -184,13 +187,14 @@ impl Follower<'_> {
     pub fn apply(&mut self, block: &mut Block, words: &[Option<usize>], numbers: &[Written]) -> Result<()> {
         let style = words.iter().flatten().next().and_then(|w| plain(&block.words()[*w]));
         for Written { axis, text } in numbers {
+            let pointed = |text: String| if self.comma { text.replace('.', ",") } else { text };
             if let Some(word) = words[*axis] {
-                block.replace(word, text)?;
+                block.replace(word, &pointed(text.clone()))?;
                 self.report.corrected_words += 1;
                 continue;
             }
             let address = self.control.axes[*axis].address.clone();
-            let text = self.restyle(text, style, *axis);
+            let text = pointed(self.restyle(text, style, *axis));
             // Behind the nearest axis before it, else before the first one, else at the end.
             let before = words[..*axis].iter().rev().flatten().next().copied();
             let behind = words[*axis..].iter().flatten().next().copied();
@@ -247,7 +251,7 @@ impl Follower<'_> {
         (self.meant, self.written) = (meant, written);
     }
 
-    /// (42): what each unseen pattern would do to tip and axis here.
+    /// (C13): what each unseen pattern would do to tip and axis here.
     fn look_at_unseen(&mut self, q: &[f64]) {
         let Some(patterns) = self.model.unseen().filter(|p| !p.is_empty()) else { return };
         let sweep = self.control.nominal.sweep(q);

@@ -59,6 +59,10 @@ pub(super) struct Follower<'a> {
     /// Sums of squares over moves of what the unseen patterns would do.
     pub unseen: Vec<Left>,
     pub unseen_moves: u64,
+    /// Whether the program writes decimal commas.
+    pub comma: bool,
+    /// The last line that went beyond what the calibration has seen.
+    pub extrapolated: usize,
     /// The cycle that a Siemens program calls behind every block that moves.
     modal_cycle: Option<String>,
     /// `G90.1`: centres of arcs are absolute.
@@ -126,6 +130,8 @@ impl<'a> Follower<'a> {
             report: Report { machine: machine.name().to_string(), ..Report::default() },
             unseen: Vec::new(),
             unseen_moves: 0,
+            comma: false,
+            extrapolated: 0,
             modal_cycle: None,
             absolute_centre: false,
             tool: Tool::default(),
@@ -474,6 +480,7 @@ impl<'a> Follower<'a> {
     /// Program coordinates at the end of the block, m or rad.
     fn target(&mut self, block: &Block, motion: &Motion) -> Result<Vec<f64>> {
         for word in block.words() {
+            self.comma |= self.dialect == Dialect::Heidenhain && block.text(&word.value_span).contains(',');
             let address = word.address.as_str();
             let followed = self.control.axes.iter().any(|a| a.address == address);
             let polar = match self.dialect {

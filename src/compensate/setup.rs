@@ -72,14 +72,25 @@ enum Angle {
 
 /// Which way of frame `t` leads from the tip into the spindle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
 pub enum ToolAxis {
     /// Along +z of frame `t`, the rule for machine tools.
     #[default]
-    #[serde(rename = "z")]
     Plus,
     /// Along -z.
-    #[serde(rename = "-z")]
     Minus,
+}
+
+impl TryFrom<String> for ToolAxis {
+    type Error = String;
+
+    fn try_from(word: String) -> Result<Self, String> {
+        match word.as_str() {
+            "z" => Ok(ToolAxis::Plus),
+            "-z" => Ok(ToolAxis::Minus),
+            _ => Err(format!("`tool_axis` is \"{word}\", expected \"z\" or \"-z\"")),
+        }
+    }
 }
 
 /// Work offsets and tools are called by upper-case names without blanks at the ends or quotes.

@@ -16,8 +16,9 @@ const MOSTLY_UNSEEN: f64 = 0.1;
 /// Poses over which the directions that move the tool are gathered.
 const POSES: usize = 24;
 
-/// Patterns of deviations, one twist per dyad in machine order (m, rad), each one standard deviation long: of all directions that move the tool as the
-/// workpiece sees it, those that come from the tolerances by more than a tenth of their variance. `docs/compensate.md` (42).
+/// Patterns of deviations, one twist per dyad in machine order (m, rad), each one standard deviation long, `docs/compensate.md`
+/// (C13): of all directions that move the tool as the workpiece sees it, those that come from the tolerances by more than a tenth
+/// of their variance.
 pub(super) fn unseen(machine: &Machine, layout: &Layout, information: &Information) -> Vec<Vec<Twist<f64>>> {
     let count = information.positions.len();
     if count == 0 {
