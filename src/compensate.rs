@@ -1,8 +1,8 @@
 //! Rewrites NC programs so that a machine with known errors cuts what the program means.
 //!
-//! The program says where tip and tool axis should be under the nominal kinematics; the inverse of the calibrated chain says which
-//! joint commands bring the actual machine there; those are written where the program's own numbers stood, every other byte as it
-//! was. `docs/compensate.md`.
+//! The program says where tip and tool axis should be under the nominal kinematics; the inverse of the
+//! calibrated chain says which joint commands bring the actual machine there; those are written where the
+//! program's own numbers stood, every other byte as it was. `docs/compensate.md`.
 //!
 //! ```
 //! use kincal::compensate::{Options, Setup, compensate_text};
@@ -21,8 +21,8 @@
 //! deviations[3].w.0[2] = -1e-3;
 //! let calibrated = CalibratedMachine::nominal(machine).with_deviations(deviations);
 //! let (text, report) = compensate_text(
-//!     &calibrated, "part.nc", "G1 X0. Y0. Z0. F900 (corner)\nY100.\n", &Setup::default(), &Options::default())?;
-//! assert_eq!(text, "G1 X0. Y0. Z0. F900 (corner)\nX.1 Y100.\n");
+//!     &calibrated, "part.nc", "G1 X0. Y0. Z0. F900 (corner)\nY100.\n", &Setup::default(),
+//! &Options::default())?; assert_eq!(text, "G1 X0. Y0. Z0. F900 (corner)\nX.1 Y100.\n");
 //! assert_eq!(report.inserted_words, 1);
 //! # Ok::<(), kincal::Error>(())
 //! ```
@@ -38,6 +38,8 @@ mod model;
 mod report;
 mod setup;
 mod straight;
+mod target;
+mod tool;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -66,7 +68,8 @@ pub struct Options {
     pub decimals: Option<usize>,
     /// Tolerance within which arcs become lines, m; without, an arc that the errors deform is refused.
     pub arcs: Option<f64>,
-    /// Largest error of the tip that a straight move may leave between its ends, m; without, moves stay whole.
+    /// Largest error of the tip that a straight move may leave between its ends, m; without, moves stay
+    /// whole.
     pub split: Option<f64>,
     /// What counts, where it is not what the machine has joints for.
     pub mode: Option<Mode>,
@@ -79,10 +82,12 @@ pub(crate) fn named(name: &str) -> String {
     name.trim().trim_matches('"').to_string()
 }
 
-/// Corrects the program `path` and writes it to `out`. Memory does not grow with the program, sub-programs aside.
+/// Corrects the program `path` and writes it to `out`. Memory does not grow with the program, sub-programs
+/// aside.
 ///
 /// # Errors
-/// [`Error::Compensate`] with the line that cannot be corrected, [`Error::Nc`], [`Error::File`]; `out` then holds a part.
+/// [`Error::Compensate`] with the line that cannot be corrected, [`Error::Nc`], [`Error::File`]; `out` then
+/// holds a part.
 pub fn compensate(
     calibrated: &CalibratedMachine,
     path: impl AsRef<Path>,

@@ -1,8 +1,9 @@
 //! Inverse kinematics of any chain: position only, position and tool axis, or the full pose.
 //!
-//! Newton steps from a warm start, `docs/compensate.md` (C1) to (C4). Orientation comes first, by the directions that the joints
-//! still have; position follows with what that leaves free. A direction in which the joints hardly move the tool is
-//! held near the start instead of being chased, so that a correction stays small at a singular pose, and is told.
+//! Newton steps from a warm start, `docs/compensate.md` (C1) to (C4). Orientation comes first, by the
+//! directions that the joints still have; position follows with what that leaves free. A direction in which
+//! the joints hardly move the tool is held near the start instead of being chased, so that a correction stays
+//! small at a singular pose, and is told.
 
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
@@ -29,8 +30,8 @@ pub enum Mode {
 /// How hard to try.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// Singular value (rad of tool direction per rad of joint, or as a part of the largest where lengths take part) below
-    /// which a direction fades out.
+    /// Singular value (rad of tool direction per rad of joint, or as a part of the largest where lengths take
+    /// part) below which a direction fades out.
     pub weak: f64,
     /// Most Newton steps.
     pub steps: usize,
@@ -62,8 +63,8 @@ pub struct Goal {
 pub enum Outcome {
     /// Every equation of the mode holds.
     Reached,
-    /// A joint would leave its travel. It stands at its limit, and the others do what they can; where the start lies outside
-    /// already, nothing is held back.
+    /// A joint would leave its travel. It stands at its limit, and the others do what they can; where the
+    /// start lies outside already, nothing is held back.
     OutOfTravel {
         /// Index of the command.
         command: usize,
@@ -72,7 +73,8 @@ pub enum Outcome {
     },
     /// At this pose the joints have lost a direction that they have elsewhere.
     Singular {
-        /// The direction in frame `w`, unit length over all: `v` a displacement of the tip, `w` a turn about it.
+        /// The direction in frame `w`, unit length over all: `v` a displacement of the tip, `w` a turn about
+        /// it.
         lost_w: Twist<f64>,
     },
     /// What is left cannot be reached, by this machine or from this start.
@@ -171,8 +173,8 @@ fn square_to(n: Vec3<f64>) -> [Vec3<f64>; 2] {
 }
 
 impl<'a> Inverse<'a> {
-    /// In the mode that the machine has joints for: the full pose with six independent freedoms, else position and tool axis where
-    /// joints turn the tool axis, else position.
+    /// In the mode that the machine has joints for: the full pose with six independent freedoms, else
+    /// position and tool axis where joints turn the tool axis, else position.
     pub fn new(machine: &'a Machine) -> Self {
         let mut inverse = Inverse {
             machine,
@@ -209,12 +211,14 @@ impl<'a> Inverse<'a> {
         self.mode
     }
 
-    /// Equations of the mode that this machine has joints for on general poses, of orientation and of position.
+    /// Equations of the mode that this machine has joints for on general poses, of orientation and of
+    /// position.
     pub fn freedoms(&self) -> (usize, usize) {
         (self.turns, self.shifts)
     }
 
-    /// Ranks over general poses: of everything, of orientation, of position, and whether linear joints alone give position.
+    /// Ranks over general poses: of everything, of orientation, of position, and whether linear joints alone
+    /// give position.
     fn ranks(&self) -> (usize, usize, usize, bool) {
         let chain = Chain::nominal(self.machine);
         let mut rng = StdRng::seed_from_u64(5);
@@ -312,8 +316,8 @@ impl<'a> Inverse<'a> {
 
     /// Commands that bring the tip to the goal, or as near as the joints can.
     ///
-    /// `start`: commands to start from, m or rad, near the solution if possible; weak directions stay near them. `free`: which
-    /// commands may change (one per command).
+    /// `start`: commands to start from, m or rad, near the solution if possible; weak directions stay near
+    /// them. `free`: which commands may change (one per command).
     ///
     /// # Panics
     /// If `start` or `free` has not one entry per command.
@@ -389,7 +393,8 @@ impl<'a> Inverse<'a> {
             loop {
                 let next: Vec<f64> = q.iter().zip(step.iter()).map(|(q, s)| q + s).collect();
                 let there = self.look(chain, goal, &next);
-                // Far from the goal a full step may overshoot; near it, and where a weak direction is drawn back, it counts.
+                // Far from the goal a full step may overshoot; near it, and where a weak direction is drawn
+                // back, it counts.
                 if longest < 1e-2 || shortened == 6 || merit(&there) < merit(&look) {
                     (q, look) = (next, there);
                     break;

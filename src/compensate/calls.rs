@@ -1,4 +1,5 @@
-//! Sub-programs that stand in the same file, `docs/compensate.md`: each line of them is written once, so every call must need the same.
+//! Sub-programs that stand in the same file, `docs/compensate.md`: each line of them is written once, so
+//! every call must need the same.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::Write;

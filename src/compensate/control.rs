@@ -1,6 +1,7 @@
 //! The control: how program coordinates become joint commands under the nominal kinematics, and back.
 //!
-//! `docs/compensate.md` (C5) to (C8). Everything here is in m and rad; programmed units end at [`Control::si`].
+//! `docs/compensate.md` (C5) to (C8). Everything here is in m and rad; programmed units end at
+//! [`Control::si`].
 
 use super::frame::Frame;
 use super::setup::{Setup, ToolAxis};
@@ -138,8 +139,9 @@ impl<'a> Control<'a> {
         known
     }
 
-    /// `T_wP` of (C6): where the program's zero stands in `w`, and how its axes lie there. Its origin is where the offset
-    /// puts the tip of a tool of no length; where the offset turns the table, its axes are those of `w` at joints zero.
+    /// `T_wP` of (C6): where the program's zero stands in `w`, and how its axes lie there. Its origin is
+    /// where the offset puts the tip of a tool of no length; where the offset turns the table, its axes are
+    /// those of `w` at joints zero.
     fn program_frame(&self) -> Pose<f64> {
         let mut q = vec![0.0; self.machine.commands().len()];
         for (i, axis) in self.axes.iter().enumerate() {
@@ -186,9 +188,11 @@ impl<'a> Control<'a> {
         Vec3(p)
     }
 
-    /// (C5), (C6): joint commands for program coordinates; `None` where the linear axes cannot bring the tip there.
+    /// (C5), (C6): joint commands for program coordinates; `None` where the linear axes cannot bring the tip
+    /// there.
     ///
-    /// `program`: one per axis, m or rad. `near`: commands of joints without address, and a start for the rest.
+    /// `program`: one per axis, m or rad. `near`: commands of joints without address, and a start for the
+    /// rest.
     pub fn joints(&self, program: &[f64], near: &[f64]) -> Option<Vec<f64>> {
         let p = self.frame.pose.transform(self.triple(program));
         let mut q = near.to_vec();

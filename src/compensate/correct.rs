@@ -48,7 +48,8 @@ impl Follower<'_> {
         Left::between(self.model.chain().w_from_t(sent) * goal.t_from_tip, goal.w_from_tip)
     }
 
-    /// Tells the model where the program goes; where that changes the piece, the step of the correction is told.
+    /// Tells the model where the program goes; where that changes the piece, the step of the correction is
+    /// told.
     pub fn advance(&mut self, line: usize, q: &[f64]) {
         self.model.advance(q);
         if self.extrapolated != line && self.model.extrapolates(q) {
@@ -67,8 +68,9 @@ impl Follower<'_> {
         }
     }
 
-    /// The joint commands that bring tip and axis of the actual machine where the program means them, and the words that
-    /// say so. `q`: as meant; the model stands there already. `words`: of the block that will carry them, by axis.
+    /// The joint commands that bring tip and axis of the actual machine where the program means them, and the
+    /// words that say so. `q`: as meant; the model stands there already. `words`: of the block that will
+    /// carry them, by axis.
     pub fn correct(
         &mut self,
         line: usize,
@@ -132,8 +134,8 @@ impl Follower<'_> {
         Correction { numbers, written: Position { q, program } }
     }
 
-    /// The number to write for an axis that should stand at `wanted` (program coordinates, m or rad), if another one than there is; returns where it then
-    /// stands.
+    /// The number to write for an axis that should stand at `wanted` (program coordinates, m or rad), if
+    /// another one than there is; returns where it then stands.
     fn number(&self, axis: usize, wanted: f64, word: Option<&Word>, numbers: &mut Vec<Written>) -> f64 {
         let now = self.written.program[axis];
         let places = self.places(axis);
@@ -183,7 +185,8 @@ impl Follower<'_> {
         }
     }
 
-    /// Puts numbers into a block: in the place of those that stand there, as new words for axes that it does not name.
+    /// Puts numbers into a block: in the place of those that stand there, as new words for axes that it does
+    /// not name.
     pub fn apply(&mut self, block: &mut Block, words: &[Option<usize>], numbers: &[Written]) -> Result<()> {
         let style = words.iter().flatten().next().and_then(|w| plain(&block.words()[*w]));
         for Written { axis, text } in numbers {

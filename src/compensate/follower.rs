@@ -1,8 +1,9 @@
-//! Follows a program block by block as its control would, twice over: where the program means to be, and where what has been
-//! written brings the machine.
+//! Follows a program block by block as its control would, twice over: where the program means to be, and
+//! where what has been written brings the machine.
 
 use std::io::Write;
 
+use super::Options;
 use super::control::Control;
 use super::correct::Left;
 use super::fault::CompensateFault;
@@ -10,11 +11,11 @@ use super::frame::{self, Change, has_g};
 use super::model::Model;
 use super::report::Report;
 use super::setup::Setup;
-use super::{Options, named};
+use super::tool::Tool;
 use crate::error::{Error, Result};
 use crate::inverse::{Inverse, Mode};
 use crate::machine::{JointKind, Machine};
-use crate::nc::{Block, Dialect, Feed, How, Kind, Modes, Motion, MotionKind, State, Units, Value};
+use crate::nc::{Block, Dialect, Feed, Kind, Modes, Motion, MotionKind, State};
 
 /// What is known of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,22 +68,12 @@ pub(super) struct Follower<'a> {
     modal_cycle: Option<String>,
     /// `G90.1`: centres of arcs are absolute.
     pub absolute_centre: bool,
-    tool: Tool,
+    pub tool: Tool,
     /// Why the next motion cannot be corrected.
-    tool_fault: Option<CompensateFault>,
+    pub tool_fault: Option<CompensateFault>,
     offset_fault: Option<CompensateFault>,
     /// Behind M2 or M30.
     pub ended: bool,
-}
-
-/// Which tool is in the spindle, and which one the control counts with.
-#[derive(Clone, Debug, Default)]
-struct Tool {
-    in_spindle: Option<String>,
-    called: Option<String>,
-    by_m6: bool,
-    /// RS-274: the name of the length in force, `None` without.
-    counted: Option<String>,
 }
 
 /// A refusal at a byte of a block.
@@ -281,83 +272,6 @@ impl<'a> Follower<'a> {
         Ok(())
     }
 
-    /// T, M6, G43, H, D; whether the length that counts may have changed.
-    fn tools(&mut self, block: &Block, before: &Modes) -> bool {
-        let modes = self.state.modes().clone();
-        let word = |address: &str| block.words().iter().find(|w| w.address == address);
-        let m6 = block.words().iter().any(|w| w.address == "M" && w.number() == Some(6.0));
-        let called = modes.tool != before.tool || word("T").is_some();
-        if called {
-            self.tool.called = modes.tool.clone();
-        }
-        if m6 || (called && !self.tool.by_m6) {
-            self.tool.by_m6 |= m6;
-            self.tool.in_spindle = self.tool.called.clone();
-        }
-        let counts = block.words().iter().filter(|w| w.address == "G").find_map(|w| match w.number() {
-            Some(43.0 | 43.4 | 43.5) => Some(true),
-            Some(49.0) => Some(false),
-            _ => None,
-        });
-        if self.dialect == Dialect::Rs274 {
-            let h = word("H").map(|w| block.text(&w.value_span));
-            match (counts, h) {
-                (Some(true), Some(h)) => self.tool.counted = Some(h),
-                (Some(true), None) => {
-                    let known = self.tool.counted.take();
-                    self.tool.counted = self.tool.in_spindle.clone().or(known).or(Some("H".into()));
-                }
-                (Some(false), _) => self.tool.counted = None,
-                (None, Some(h)) if self.tool.counted.is_some() => self.tool.counted = Some(h),
-                _ => {}
-            }
-        }
-        let touched = called || m6 || counts.is_some() || word("H").is_some() || word("D").is_some();
-        if touched {
-            self.lengths(&modes);
-        }
-        touched
-    }
-
-    /// Lengths of the tool that is there and of the one that the control counts with.
-    fn lengths(&mut self, modes: &Modes) {
-        let setup = self.control.setup;
-        self.tool_fault = None;
-        let unknown = |tool: &str| Some(CompensateFault::UnknownTool { tool: named(tool) });
-        let mut length_of = |tool: &str, edge: Option<f64>| {
-            let by_edge =
-                edge.filter(|d| *d > 1.0).and_then(|d| setup.length(&format!("{} D{d}", named(tool))));
-            by_edge.or_else(|| setup.length(tool)).unwrap_or_else(|| {
-                self.tool_fault = unknown(tool);
-                0.0
-            })
-        };
-        let tool = self.tool.in_spindle.as_deref();
-        match self.dialect {
-            Dialect::Rs274 => {
-                let counted = self.tool.counted.as_deref();
-                self.control.length = counted.map_or(0.0, |h| length_of(h, None));
-                self.control.tip_length = match (tool, counted) {
-                    (Some(tool), Some(_)) => setup.length(tool).unwrap_or(self.control.length),
-                    (Some(tool), None) => length_of(tool, None),
-                    (None, Some(_)) => self.control.length,
-                    (None, None) => setup.reference_length(),
-                };
-            }
-            Dialect::Siemens => {
-                let there = tool.map(|tool| length_of(tool, modes.length_offset));
-                self.control.tip_length = there.unwrap_or(setup.reference_length());
-                let counts = modes.length_offset != Some(0.0);
-                self.control.length = there.filter(|_| counts).unwrap_or(0.0);
-            }
-            Dialect::Heidenhain => {
-                let there = tool.map(|tool| length_of(tool, None));
-                self.control.tip_length = there.unwrap_or(setup.reference_length());
-                self.control.length = there.unwrap_or(0.0);
-            }
-        }
-    }
-
     /// Coordinates mean something else now; the machine has not moved.
     fn refresh(&mut self) {
         for position in [&mut self.meant, &mut self.written] {
@@ -477,89 +391,8 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Program coordinates at the end of the block, m or rad.
-    fn target(&mut self, block: &Block, motion: &Motion) -> Result<Vec<f64>> {
-        for word in block.words() {
-            self.comma |= self.dialect == Dialect::Heidenhain && block.text(&word.value_span).contains(',');
-            let address = word.address.as_str();
-            let followed = self.control.axes.iter().any(|a| a.address == address);
-            let polar = match self.dialect {
-                Dialect::Siemens => matches!(address, "AP" | "RP"),
-                Dialect::Heidenhain => matches!(address, "PR" | "PA"),
-                Dialect::Rs274 => false,
-            };
-            if polar {
-                let what = format!("polar coordinates (`{address}`)");
-                return refuse(block, word.span.start, CompensateFault::OtherMotion { what });
-            }
-            let vector = matches!(
-                address,
-                "A2" | "B2" | "C2" | "A3" | "B3" | "C3" | "LEAD" | "TILT" | "TX" | "TY" | "TZ"
-            );
-            let straight =
-                matches!(motion.kind, MotionKind::Rapid | MotionKind::Linear | MotionKind::Unstated);
-            let by_ijk = self.dialect == Dialect::Rs274
-                && self.control.tcp
-                && straight
-                && matches!(address, "I" | "J" | "K");
-            if !followed && ((vector && self.dialect != Dialect::Rs274) || by_ijk) {
-                let address = address.to_string();
-                return refuse(block, word.span.start, CompensateFault::ToolVector { address });
-            }
-        }
-        let mut target = self.meant.program.clone();
-        for (i, index) in motion.words.iter().enumerate() {
-            let Some(index) = *index else { continue };
-            let word = &block.words()[index];
-            let address = word.address.clone();
-            let Value::Number(number) = word.value else {
-                let text = block.text(&word.value_span).chars().take(40).collect();
-                return refuse(block, word.span.start, CompensateFault::Expression { address, text });
-            };
-            let rotary = self.control.axes[i].rotary;
-            let seen = &mut self.decimals[usize::from(rotary)];
-            *seen = (*seen).max(number.decimals.min(6));
-            let value = self.control.si(i, number.value);
-            let now = target[i];
-            let turn = std::f64::consts::TAU;
-            let upward = (value - now).rem_euclid(turn);
-            target[i] = match self.how(word.how) {
-                How::Incremental if self.status[i] != Status::Placed => {
-                    return refuse(block, word.span.start, CompensateFault::UnknownStart { address });
-                }
-                How::Incremental => now + value,
-                // Within a turn, the way that the word says.
-                How::Shortest if upward > 0.5 * turn => now + upward - turn,
-                How::Shortest | How::Positive => now + upward,
-                How::Negative if upward > 0.0 => now + upward - turn,
-                How::Negative => now,
-                _ => value,
-            };
-            self.status[i] = Status::Placed;
-        }
-        Ok(target)
-    }
-
-    /// What a word means, modes included.
-    pub fn how(&self, how: How) -> How {
-        match how {
-            How::Modal if self.state.modes().distance == Some(crate::nc::Distance::Incremental) => {
-                How::Incremental
-            }
-            How::Modal => How::Absolute,
-            how => how,
-        }
-    }
-
-    /// Digits behind the point for an axis.
-    pub fn places(&self, axis: usize) -> usize {
-        let rotary = self.control.axes[axis].rotary;
-        let least = if !rotary && self.control.units == Units::Inch { 4 } else { 3 };
-        self.options.decimals.unwrap_or_else(|| self.decimals[usize::from(rotary)].max(least))
-    }
-
-    /// Commands that may be written: their axis has a place in the program. Where the tip is programmed the three linear ones go
-    /// together.
+    /// Commands that may be written: their axis has a place in the program. Where the tip is programmed the
+    /// three linear ones go together.
     pub fn free(&self) -> Vec<bool> {
         let mut free = vec![false; self.machine.commands().len()];
         for (axis, status) in self.control.axes.iter().zip(&self.status) {

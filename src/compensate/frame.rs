@@ -65,8 +65,8 @@ pub(super) fn has_g(block: &Block, code: f64) -> bool {
     block.words().iter().any(|w| w.address == "G" && w.number() == Some(code))
 }
 
-/// Takes a block that changes the frame into account. `place`: where each axis stands in program coordinates, where that is
-/// known, m or rad.
+/// Takes a block that changes the frame into account. `place`: where each axis stands in program coordinates,
+/// where that is known, m or rad.
 pub(super) fn change(
     control: &mut Control,
     block: &Block,

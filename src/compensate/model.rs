@@ -6,8 +6,9 @@ use crate::lie::Twist;
 
 /// A machine that is told where it is sent, one commanded position after the other.
 ///
-/// Errors may depend on how a position was reached. A model keeps what that takes (directions of travel with a dead band, play);
-/// standing still changes nothing, and before the first motion the directions are those of the first motion.
+/// Errors may depend on how a position was reached. A model keeps what that takes (directions of travel with
+/// a dead band, play); standing still changes nothing, and before the first motion the directions are those
+/// of the first motion.
 pub trait Model {
     /// Takes the next commanded position into account, m or rad, machine order.
     fn advance(&mut self, commands: &[f64]);

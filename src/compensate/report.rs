@@ -150,15 +150,16 @@ pub struct Report {
     pub unreachable: Listed<Unreached>,
     /// Moves beyond what the calibration has seen.
     pub extrapolated_moves: u64,
-    /// Addresses that the program never names; their joints were taken where they stand at the start, and left there.
+    /// Addresses that the program never names; their joints were taken where they stand at the start, and
+    /// left there.
     pub never_programmed: Vec<String>,
-    /// What the calibration has not seen of the errors of tip and tool axis at the ends of these moves; `None` where that is not
-    /// known.
+    /// What the calibration has not seen of the errors of tip and tool axis at the ends of these moves;
+    /// `None` where that is not known.
     pub unseen: Option<Unseen>,
 }
 
-/// Errors of tip and tool axis that may be left because no recording has shown them. Root mean squares over the moves, one
-/// standard deviation.
+/// Errors of tip and tool axis that may be left because no recording has shown them. Root mean squares over
+/// the moves, one standard deviation.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Unseen {
     /// Of the tip, m.

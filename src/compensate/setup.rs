@@ -169,7 +169,8 @@ impl Setup {
         }
     }
 
-    /// What the control shows for this axis in the machine's own frame where the joint stands at zero, m or rad.
+    /// What the control shows for this axis in the machine's own frame where the joint stands at zero, m or
+    /// rad.
     pub(super) fn zero(&self, address: &str, rotary: bool) -> f64 {
         self.form.zero.get(address).map_or(0.0, |value| self.si(*value, rotary))
     }

@@ -71,7 +71,8 @@ impl Follower<'_> {
         put(block, out)
     }
 
-    /// A drilling cycle at the place of the block: its place is corrected in the plane, its depths and its angles stay.
+    /// A drilling cycle at the place of the block: its place is corrected in the plane, its depths and its
+    /// angles stay.
     pub fn cycle(
         &mut self,
         block: &mut Block,
@@ -231,8 +232,8 @@ impl Follower<'_> {
         Ok(false)
     }
 
-    /// `count` lines in the place of one block: the block itself to the first point and lines behind it, or, where it does something at
-    /// its end, lines before it.
+    /// `count` lines in the place of one block: the block itself to the first point and lines behind it, or,
+    /// where it does something at its end, lines before it.
     fn lines(
         &mut self,
         block: &mut Block,

@@ -1,4 +1,5 @@
-//! What a calibration leaves open of tip and tool axis: deviations that may be there as well, one pattern for each direction.
+//! What a calibration leaves open of tip and tool axis: deviations that may be there as well, one pattern for
+//! each direction.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 use rand::SeedableRng;
@@ -16,15 +17,16 @@ const MOSTLY_UNSEEN: f64 = 0.1;
 /// Poses over which the directions that move the tool are gathered.
 const POSES: usize = 24;
 
-/// Patterns of deviations, one twist per dyad in machine order (m, rad), each one standard deviation long, `docs/compensate.md`
-/// (C13): of all directions that move the tool as the workpiece sees it, those that come from the tolerances by more than a tenth
-/// of their variance.
+/// Patterns of deviations, one twist per dyad in machine order (m, rad), each one standard deviation long,
+/// `docs/compensate.md` (C13): of all directions that move the tool as the workpiece sees it, those that come
+/// from the tolerances by more than a tenth of their variance.
 pub(super) fn unseen(machine: &Machine, layout: &Layout, information: &Information) -> Vec<Vec<Twist<f64>>> {
     let count = information.positions.len();
     if count == 0 {
         return Vec::new();
     }
-    // Where each component of each dyad stands among the unknowns with a prior; `w` as in the first set-up that has one.
+    // Where each component of each dyad stands among the unknowns with a prior; `w` as in the first set-up
+    // that has one.
     let known_w = layout.blocks.iter().find(|b| b.prior && matches!(b.role, Role::Setup(_)));
     let block = |j: usize| {
         let found = if j == machine.w_index() { known_w } else { layout.block(Role::Dyad(j)) };
