@@ -43,6 +43,8 @@ pub(crate) struct CalibrationForm {
     seen: Vec<SeenForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pieces: Option<PiecesForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    unseen: Option<Vec<Vec<DeviationForm>>>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -103,6 +105,8 @@ pub struct CalibratedMachine {
     pub(crate) zeros: Vec<(String, String, f64)>,
     pub(crate) lengths: Vec<(String, f64)>,
     seen: Vec<Option<(f64, f64)>>,
+    /// Patterns of deviations that may be there as well.
+    pub(crate) unseen: Option<Vec<Vec<Twist<f64>>>>,
     samples: u64,
     rms: Rms,
     variation: Variation,
@@ -120,6 +124,7 @@ impl CalibratedMachine {
             zeros: Vec::new(),
             lengths: Vec::new(),
             seen: vec![None; commands],
+            unseen: None,
             samples: 0,
             rms: Rms::default(),
             variation: Variation::default(),
@@ -215,6 +220,12 @@ impl CalibratedMachine {
         self.seen[command]
     }
 
+    /// What the recordings have not seen of tip and tool axis: patterns of deviations (one twist per dyad, machine order, m and
+    /// rad), each one standard deviation long and independent of the others. `None` where the file does not say.
+    pub fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
+        self.unseen.as_deref()
+    }
+
     /// Whether a vector of commands leaves what the calibration has seen by more than 1 % of the range of any joint.
     pub fn extrapolates(&self, commands: &[f64]) -> bool {
         commands.iter().zip(&self.seen).any(|(q, seen)| {
@@ -254,6 +265,11 @@ impl CalibratedMachine {
     fn fill(&mut self, form: &CalibrationForm) -> std::result::Result<(), (String, MachineFault)> {
         let units = self.machine.units();
         self.deviations = deviations(&self.machine, "calibration.deviations", &form.deviations)?;
+        let pattern = |(i, pattern): (usize, &Vec<DeviationForm>)| {
+            deviations(&self.machine, &format!("calibration.unseen[{i}]"), pattern)
+        };
+        let unseen = form.unseen.as_ref().map(|all| all.iter().enumerate().map(pattern).collect());
+        self.unseen = unseen.transpose()?;
         for (i, setup) in form.setups.iter().enumerate() {
             let path = format!("calibration.setups[{i}]");
             let placement = Placement {
@@ -308,6 +324,12 @@ impl CalibratedMachine {
         let units = self.machine.units();
         let mut form = self.machine.to_form();
         let deviations = deviation_forms(&self.machine, &self.deviations);
+        let pattern = |twists: &Vec<Twist<f64>>| -> Vec<DeviationForm> {
+            let mut forms = deviation_forms(&self.machine, twists);
+            forms.retain(|d| d.v != (0.0, 0.0, 0.0) || d.w != (0.0, 0.0, 0.0));
+            forms
+        };
+        let unseen = self.unseen.as_ref().map(|all| all.iter().map(pattern).collect());
         let place = |(name, pose): &(String, Pose<f64>)| PlaceForm {
             name: name.clone(),
             at: in_unit(pose.translation, units.length),
@@ -342,6 +364,7 @@ impl CalibratedMachine {
                 .collect(),
             seen: seen.collect(),
             pieces: PiecesForm::of(&self.machine, &self.variation),
+            unseen,
         });
         to_text(&form)
     }

@@ -3,6 +3,7 @@
 mod calibrate;
 mod check;
 mod compare;
+mod compensate;
 mod demo;
 mod describe;
 mod diagnose;
@@ -36,6 +37,8 @@ enum Command {
     Predict(predict::Args),
     /// Locates what a model leaves over, names the physics left out, and models it
     Diagnose(diagnose::Args),
+    /// The NC program with corrected axis words, everything else as it was
+    Compensate(compensate::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
     Demo(demo::Args),
 }
@@ -60,6 +63,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Compare(args) => compare::run(&args),
         Command::Predict(args) => predict::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
+        Command::Compensate(args) => compensate::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     match outcome {

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::compensate::CompensateFault;
 use crate::effects::LibraryFault;
 use crate::machine::MachineFault;
 use crate::nc::NcFault;
@@ -83,6 +84,14 @@ pub enum Error {
         /// What is wrong.
         fault: LibraryFault,
     },
+    /// An NC program that cannot be corrected as it stands.
+    #[error("{place}: {fault}")]
+    Compensate {
+        /// Where in the program.
+        place: Place,
+        /// Why not.
+        fault: Box<CompensateFault>,
+    },
     /// A text in RON that cannot be read at all.
     #[error("{place}: {message}")]
     Ron {
@@ -119,6 +128,7 @@ impl Error {
             Error::Recording { fault, .. } => fault.mend(),
             Error::Nc { fault, .. } => fault.mend(),
             Error::Effects { fault, .. } => fault.mend.clone(),
+            Error::Compensate { fault, .. } => fault.mend(),
             Error::Ron { mend, .. } | Error::Undetermined { mend, .. } => mend.clone(),
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
@@ -134,6 +144,7 @@ impl Error {
             | Error::Recording { place, .. }
             | Error::Nc { place, .. }
             | Error::Effects { place, .. }
+            | Error::Compensate { place, .. }
             | Error::Ron { place, .. } => Some(place),
             Error::File { .. } | Error::Undetermined { .. } => None,
         }

@@ -16,6 +16,7 @@ mod source;
 mod stretch;
 mod thin;
 mod unknowns;
+mod unseen;
 
 pub(crate) use evaluator::{Evaluator, Moment, Values};
 pub use fit::{
@@ -140,6 +141,7 @@ pub fn calibrate_model(
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
     let information = Info::new(&found.solution.normal.matrix, &layout, prior, open);
     let mut calibrated = calibrated(machine, &sources, &found);
+    calibrated.unseen = Some(unseen::unseen(machine, &layout, &information));
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
     let unknowns = &found.solution.unknowns;
     if !varying.is_constant() {

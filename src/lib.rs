@@ -34,6 +34,8 @@
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
 //! | [`rivals`] | identification by other schemes, and a filter, judged side by side |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
+//! | [`inverse`] | commands that bring the tool to a pose, for any chain |
+//! | [`mod@compensate`] | NC programs rewritten so that the actual machine cuts what they mean |
 //! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known |
 //!
 //! # A complete example
@@ -73,6 +75,7 @@
 mod calibration;
 pub mod chain;
 pub mod check;
+pub mod compensate;
 pub mod demo;
 pub mod describe;
 pub mod diagnose;
@@ -81,6 +84,7 @@ pub mod effects;
 pub mod error;
 pub mod feature;
 pub mod identify;
+pub mod inverse;
 pub mod lie;
 pub mod location;
 pub mod machine;

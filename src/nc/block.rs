@@ -59,9 +59,14 @@ impl Block {
         Block::of_file(Arc::from(Path::new("")), line, bytes.to_vec(), dialect)
     }
 
-    pub(super) fn of_file(file: Arc<Path>, line: usize, bytes: Vec<u8>, dialect: Dialect) -> Block {
+    pub(crate) fn of_file(file: Arc<Path>, line: usize, bytes: Vec<u8>, dialect: Dialect) -> Block {
         let (tokens, words) = Cutter::cut(&bytes, dialect);
         Block { file, line, bytes, tokens, words, edits: Vec::new() }
+    }
+
+    /// The file that the line is from, as the user named it.
+    pub(crate) fn file(&self) -> Arc<Path> {
+        self.file.clone()
     }
 
     /// Number of the line, from 1.
@@ -129,17 +134,53 @@ impl Block {
     /// [`NcFault::NoSuchWord`], [`NcFault::BadAddress`], [`NcFault::NotPlain`].
     pub fn insert(&mut self, after: usize, address: &str, number: &str) -> Result<()> {
         let end = self.word(after)?.span.end;
+        let text = self.new_word(end, address, number)?;
+        let blank = self.separator(after);
+        self.edit(end..end, format!("{blank}{text}"));
+        Ok(())
+    }
+
+    /// Puts a new word before word `before`; otherwise as [`Block::insert`].
+    ///
+    /// # Errors
+    /// As [`Block::insert`].
+    pub fn insert_before(&mut self, before: usize, address: &str, number: &str) -> Result<()> {
+        let start = self.word(before)?.span.start;
+        let text = self.new_word(start, address, number)?;
+        let blank = self.separator(before);
+        self.edit(start..start, format!("{text}{blank}"));
+        Ok(())
+    }
+
+    /// Takes a word out, with the blanks before it.
+    ///
+    /// # Errors
+    /// [`NcFault::NoSuchWord`].
+    pub fn remove(&mut self, word: usize) -> Result<()> {
+        let span = self.word(word)?.span.clone();
+        let blanks = self.bytes[..span.start].iter().rev().take_while(|b| matches!(b, b' ' | b'\t')).count();
+        let range = span.start - blanks..span.end;
+        self.edits.retain(|(other, _)| other.start < range.start || other.end > range.end);
+        self.edit(range, String::new());
+        Ok(())
+    }
+
+    /// What stands between words: nothing where the block packs them.
+    pub(crate) fn separator(&self, word: usize) -> &'static str {
+        let packed = self.words.windows(2).any(|w| w[0].span.end == w[1].span.start)
+            && self.words[word].value != Value::Expression;
+        if packed { "" } else { " " }
+    }
+
+    /// Address and number as a word of this block.
+    fn new_word(&self, end: usize, address: &str, number: &str) -> Result<String> {
         let letters = address.bytes().take_while(u8::is_ascii_alphabetic).count();
         if letters == 0 || !address.bytes().all(|b| b.is_ascii_alphanumeric()) {
             return Err(self.fault(end, NcFault::BadAddress { address: short(address) }));
         }
         self.check_number(end, number)?;
-        let packed = self.words.windows(2).any(|w| w[0].span.end == w[1].span.start)
-            && self.words[after].value != Value::Expression;
-        let blank = if packed { "" } else { " " };
         let equals = if address.len() > 1 { "=" } else { "" };
-        self.edit(end..end, format!("{blank}{address}{equals}{number}"));
-        Ok(())
+        Ok(format!("{address}{equals}{number}"))
     }
 
     /// Whether anything was replaced or inserted.
@@ -168,9 +209,14 @@ impl Block {
         if self.is_changed() { out.write_all(&self.output()) } else { out.write_all(&self.bytes) }
     }
 
+    /// The place of a byte of this line.
+    pub fn place(&self, byte: usize) -> Place {
+        Place::at(&self.file, self.line, self.column(byte))
+    }
+
     /// A fault at a byte of this line.
     pub(super) fn fault(&self, byte: usize, fault: NcFault) -> Error {
-        Error::Nc { place: Place::at(&self.file, self.line, self.column(byte)), fault: Box::new(fault) }
+        Error::Nc { place: self.place(byte), fault: Box::new(fault) }
     }
 
     /// Column in characters, from 1.

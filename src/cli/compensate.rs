@@ -1,0 +1,281 @@
+//! `kincal compensate`
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use kincal::CalibratedMachine;
+use kincal::compensate::{Listed, Options, Report, Setup, Worst, compensate};
+use kincal::inverse::Mode;
+use kincal::nc::Dialect;
+use kincal::units::{Quantity, Unit};
+
+use super::Common;
+use super::output::{Failure, Outcome, angle, check_outputs, count, length, open_machine, write_whole};
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Machine file, calibrated or not
+    #[arg(value_name = "CALIBRATED.ron")]
+    machine: PathBuf,
+    /// NC program
+    #[arg(value_name = "PROGRAM.nc")]
+    program: PathBuf,
+    /// Where to write the corrected program
+    #[arg(short, long, value_name = "OUT.nc")]
+    output: Option<PathBuf>,
+    /// Tools and work offsets, docs/compensate.md
+    #[arg(long, value_name = "SETUP.ron")]
+    setup: Option<PathBuf>,
+    /// Write arcs as lines within this tolerance, such as 0.002mm
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
+    arcs: Option<f64>,
+    /// Subdivide straight moves that would leave more than this between their ends
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
+    split: Option<f64>,
+    /// Digits behind the point
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=9))]
+    decimals: Option<u8>,
+    /// What is corrected, where it is not what the machine has joints for
+    #[arg(long, value_enum)]
+    mode: Option<ModeWord>,
+    /// The control, where the program's first lines do not say it
+    #[arg(long, value_enum)]
+    dialect: Option<DialectWord>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum ModeWord {
+    /// The tip alone
+    Position,
+    /// Tip and tool axis
+    Axis,
+    /// The whole pose
+    Pose,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum DialectWord {
+    /// LinuxCNC, Fanuc, Haas and their kin
+    Rs274,
+    Siemens,
+    Heidenhain,
+}
+
+/// A length with its unit, m.
+fn tolerance(text: &str) -> Result<f64, String> {
+    let digits = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(digits);
+    let unit = Unit::named(unit.trim()).filter(|u| u.quantity == Quantity::Length);
+    match (number.trim().parse::<f64>(), unit) {
+        (Ok(number), Some(unit)) if number > 0.0 && number.is_finite() => Ok(unit.to_si(number)),
+        (Ok(_), Some(_)) => Err("expected a length above zero".into()),
+        (Ok(_), None) => {
+            Err(format!("expected a unit behind the number: {}", Unit::symbols_of(Quantity::Length)))
+        }
+        _ => Err("expected a length with its unit, such as 0.002mm".into()),
+    }
+}
+
+pub(crate) fn run(args: &Args) -> Outcome {
+    let outputs = [args.output.as_deref(), args.common.json_file()];
+    check_outputs(&outputs, &[])?;
+    for output in outputs.into_iter().flatten() {
+        let same = |input: &PathBuf| match (output.canonicalize(), input.canonicalize()) {
+            (Ok(a), Ok(b)) => a == b,
+            _ => false,
+        };
+        if same(&args.program) || same(&args.machine) {
+            return Err(Failure::Told {
+                what: format!("{}: the output is one of the inputs", output.display()),
+                mend: "give the output another name; a program corrected twice is wrong".into(),
+            });
+        }
+    }
+    let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
+    let setup = args.setup.as_ref().map_or(Ok(Setup::default()), Setup::open)?;
+    let options = Options {
+        decimals: args.decimals.map(usize::from),
+        arcs: args.arcs,
+        split: args.split,
+        mode: args.mode.map(|mode| match mode {
+            ModeWord::Position => Mode::Position,
+            ModeWord::Axis => Mode::PositionAndAxis,
+            ModeWord::Pose => Mode::Pose,
+        }),
+        dialect: args.dialect.map(|dialect| match dialect {
+            DialectWord::Rs274 => Dialect::Rs274,
+            DialectWord::Siemens => Dialect::Siemens,
+            DialectWord::Heidenhain => Dialect::Heidenhain,
+        }),
+    };
+    let progress = args.common.progress();
+    progress.say(&format!("correcting {}", args.program.display()));
+    let mut report = None;
+    match &args.output {
+        None => {
+            let mut nowhere = std::io::sink();
+            report = Some(compensate(&calibrated, &args.program, &setup, &options, &mut nowhere)?);
+        }
+        Some(path) => write_whole(path, |out| {
+            report = Some(compensate(&calibrated, &args.program, &setup, &options, out)?);
+            Ok(())
+        })?,
+    }
+    drop(progress);
+    let Some(report) = report else { return Ok(()) };
+    let mut text = render(&report, &args.program.display().to_string());
+    if let Some(path) = &args.output {
+        let _ = writeln!(text, "written to {}", path.display());
+    }
+    args.common.say(&text);
+    args.common.write_json(&report)
+}
+
+fn at(worst: Worst, show: fn(f64) -> String) -> String {
+    match worst.line {
+        0 => show(worst.value),
+        line => format!("{} (line {line})", show(worst.value)),
+    }
+}
+
+/// `lines 3, 7, 9 and 12 more`.
+fn lines<T>(listed: &Listed<T>, line: impl Fn(&T) -> usize) -> String {
+    const SHOWN: usize = 8;
+    let mut shown: Vec<usize> = listed.first.iter().map(line).collect();
+    shown.dedup();
+    let names: Vec<String> = shown.iter().take(SHOWN).map(usize::to_string).collect();
+    let more = listed.count.saturating_sub(names.len() as u64);
+    let more = if more > 0 && listed.count as usize > SHOWN { " and more" } else { "" };
+    format!("{} {}{more}", if names.len() == 1 { "line" } else { "lines" }, names.join(", "))
+}
+
+/// The report as people read it.
+fn render(r: &Report, program: &str) -> String {
+    let mut text =
+        format!("{program}: {}, {}", count(r.blocks, "line", "lines"), count(r.moves, "move", "moves"));
+    if r.machine_moves > 0 {
+        let _ = write!(text, ", {} in the machine's own frame left as they are", r.machine_moves);
+    }
+    text.push('\n');
+    if r.corrected_words + r.inserted_words + r.split_arcs == 0 {
+        text.push_str("nothing to correct\n");
+        return text + &notes(r);
+    }
+    let _ = writeln!(
+        text,
+        "{} corrected, {} inserted",
+        count(r.corrected_words, "axis word", "axis words"),
+        r.inserted_words
+    );
+    if r.split_arcs > 0 {
+        let _ = writeln!(
+            text,
+            "{} written as {}, at most {} off",
+            count(r.split_arcs, "arc", "arcs"),
+            count(r.arc_lines, "line", "lines"),
+            at(r.largest_arc_m, length)
+        );
+    }
+    if r.split_moves > 0 {
+        let _ = writeln!(text, "{} subdivided", count(r.split_moves, "straight move", "straight moves"));
+    }
+    let (m, rad) = (r.largest_correction_m, r.largest_correction_rad);
+    let _ = writeln!(text, "largest correction: tip {}, tool axis {}", at(m, length), at(rad, angle));
+    let (m, rad) = (r.largest_left_m, r.largest_left_rad);
+    let _ = writeln!(
+        text,
+        "left at the end of a move, rounding included: tip {}, tool axis {}",
+        at(m, length),
+        at(rad, angle)
+    );
+    let _ = writeln!(text, "left along a straight move: tip {}", at(r.largest_mid_line_m, length));
+    text + &notes(r)
+}
+
+fn notes(r: &Report) -> String {
+    let mut text = String::new();
+    if r.reversals.count > 0 {
+        let _ = writeln!(
+            text,
+            "note: the correction steps at {} where a direction of travel changes, by {} at most: {}",
+            count(r.reversals.count, "block", "blocks"),
+            at(r.largest_reversal_m, length),
+            lines(&r.reversals, |x| x.line)
+        );
+    }
+    if r.cycles > 0 {
+        let _ = writeln!(
+            text,
+            "note: {} corrected in the plane only, which leaves {} at most",
+            count(r.cycles, "drilling cycle", "drilling cycles"),
+            at(r.largest_cycle_m, length)
+        );
+    }
+    if r.out_of_travel.count > 0 {
+        let joints: std::collections::BTreeSet<&str> =
+            r.out_of_travel.first.iter().map(|o| o.joint.as_str()).collect();
+        let joints: Vec<&str> = joints.into_iter().collect();
+        let _ = writeln!(
+            text,
+            "note: {} out of travel at {}: {}",
+            joints.join(", "),
+            count(r.out_of_travel.count, "block", "blocks"),
+            lines(&r.out_of_travel, |x| x.line)
+        );
+    }
+    if r.singular.count > 0 {
+        let _ = writeln!(
+            text,
+            "note: a direction of the tool axis is lost at {}, and what is wrong there stays: {}",
+            count(r.singular.count, "block", "blocks"),
+            lines(&r.singular, |x| x.line)
+        );
+    }
+    if r.unreachable.count > 0 {
+        let _ = writeln!(
+            text,
+            "note: the corrected machine does not reach {}: {}",
+            count(r.unreachable.count, "block", "blocks"),
+            lines(&r.unreachable, |x| x.line)
+        );
+    }
+    if r.extrapolated_moves > 0 {
+        let _ = writeln!(
+            text,
+            "note: {} leave what the calibration has seen",
+            count(r.extrapolated_moves, "move", "moves")
+        );
+    }
+    if !r.never_programmed.is_empty() {
+        let _ = writeln!(
+            text,
+            "note: the program never names {}; taken as standing at zero (or at `start` of the set-up), and not moved",
+            r.never_programmed.join(", ")
+        );
+    }
+    match &r.unseen {
+        Some(unseen) if !unseen.patterns.is_empty() => {
+            let _ = writeln!(
+                text,
+                "not seen by the calibration, and left (one standard deviation): tip {}, tool axis {}",
+                length(unseen.tip_m),
+                angle(unseen.axis_rad)
+            );
+            for p in unseen.patterns.iter().take(5) {
+                let (tip, axis) = (length(p.tip_m), angle(p.axis_rad));
+                let _ = writeln!(text, "  along {}: tip {tip}, tool axis {axis}", p.mostly.join(" "));
+            }
+            if unseen.patterns.len() > 5 {
+                let _ = writeln!(text, "  and {} more", unseen.patterns.len() - 5);
+            }
+        }
+        Some(_) => {}
+        None if r.corrected_words + r.inserted_words > 0 => {
+            text.push_str("note: the calibrated file does not say what its recordings have not seen\n");
+        }
+        None => {}
+    }
+    text
+}

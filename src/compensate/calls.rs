@@ -1,0 +1,198 @@
+//! Sub-programs that stand in the same file, `docs/compensate.md`: each line of them is written once, so
+//! every call must need the same.
+
+use std::collections::{BTreeMap, HashMap};
+use std::io::Write;
+
+use super::fault::CompensateFault;
+use super::follower::{Follower, line_text, put, put_bytes, refuse};
+use crate::error::Result;
+use crate::nc::{Block, Dialect, Kind};
+
+/// Most levels of calls.
+const DEEPEST: usize = 10;
+/// Most times that one call repeats its sub-program.
+const MOST_TIMES: f64 = 10_000.0;
+
+/// What a call is called in messages and in the set-up: `M98 P1000`, `L6`, `CYCLE81`.
+pub(super) fn name_of(block: &Block) -> String {
+    let word = |address: &str| block.words().iter().find(|w| w.address == address);
+    let text = |address: &str| word(address).map(|w| block.text(&w.span).to_ascii_uppercase());
+    let callers = ["M98", "M198", "G65", "G66", "G66.1"];
+    let calling = block.words().iter().map(|w| block.text(&w.span).to_ascii_uppercase());
+    if let Some(code) = calling.into_iter().find(|t| callers.contains(&t.as_str())) {
+        return text("P").map_or(code.clone(), |p| format!("{code} {p}"));
+    }
+    if let Some(l) = text("L") {
+        return l;
+    }
+    let named = block.tokens().iter().find(|t| matches!(t.kind, Kind::Name | Kind::Call));
+    named.map_or_else(|| line_text(block), |t| block.name(t))
+}
+
+/// Sub-programs of a file: their lines, and what they say once corrected.
+#[derive(Default)]
+pub(super) struct Calls {
+    bodies: BTreeMap<String, Vec<(usize, Vec<u8>)>>,
+    /// Of lines of sub-programs.
+    written: HashMap<usize, Vec<u8>>,
+    /// Whether what is written is being found, and not yet put out.
+    pub collecting: bool,
+}
+
+/// What a line is for sub-programs.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Mark {
+    /// Nothing.
+    Line,
+    /// A sub-program begins, `O1000` or `o100 sub`; ends, `M99` or `o100 endsub`.
+    Begin(String),
+    End,
+    /// It is run so many times.
+    Call(String, usize),
+}
+
+/// `O100`, `o<name>` and the word behind it.
+fn o_word(text: &str) -> Option<(String, String)> {
+    let text = text.trim_start();
+    let text = text
+        .strip_prefix(|c: char| c == 'N' || c == 'n')
+        .map_or(text, |rest| rest.trim_start_matches(|c: char| c.is_ascii_digit()).trim_start());
+    let rest = text.strip_prefix(['O', 'o', ':'])?.trim_start();
+    let (name, rest) = if let Some(inner) = rest.strip_prefix('<') {
+        let (name, rest) = inner.split_once('>')?;
+        (name.to_ascii_lowercase(), rest)
+    } else {
+        let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
+        (rest[..digits].trim_start_matches('0').to_string(), &rest[digits..])
+    };
+    if name.is_empty() {
+        return None;
+    }
+    let word: String = rest.trim_start().chars().take_while(char::is_ascii_alphabetic).collect();
+    Some((name, word.to_ascii_uppercase()))
+}
+
+/// What a line is for sub-programs.
+pub(super) fn mark(block: &Block, dialect: Dialect) -> Mark {
+    if dialect != Dialect::Rs274 {
+        return Mark::Line;
+    }
+    let text = String::from_utf8_lossy(block.bytes());
+    if let Some((name, word)) = o_word(&text) {
+        return match word.as_str() {
+            "" | "SUB" => Mark::Begin(name),
+            "ENDSUB" => Mark::End,
+            "CALL" if !text.contains('[') => Mark::Call(name, 1),
+            _ => Mark::Line,
+        };
+    }
+    let number = |address: &str| block.words().iter().find(|w| w.address == address).and_then(|w| w.number());
+    match number("M") {
+        Some(98.0) => {
+            let times = number("L").or(number("K")).unwrap_or(1.0);
+            match number("P") {
+                Some(p) if times.fract() == 0.0 && (0.0..MOST_TIMES).contains(&times) => {
+                    Mark::Call(format!("{p}"), times as usize)
+                }
+                _ => Mark::Line,
+            }
+        }
+        Some(99.0) => Mark::End,
+        _ => Mark::Line,
+    }
+}
+
+/// Which lines belong to sub-programs: told line by line, in the order of the file.
+#[derive(Default)]
+pub(super) struct Bounds {
+    inside: Option<String>,
+    ended: bool,
+}
+
+impl Bounds {
+    /// The sub-program that this line belongs to, its first and last line included.
+    pub fn of(&mut self, block: &Block, dialect: Dialect) -> Option<String> {
+        let text = String::from_utf8_lossy(block.bytes());
+        match mark(block, dialect) {
+            // A bare `O1000` at the start names the program itself; LinuxCNC writes `sub`.
+            Mark::Begin(name) if self.ended || o_word(&text).is_some_and(|(_, w)| w == "SUB") => {
+                self.inside = Some(name);
+                self.inside.clone()
+            }
+            Mark::End => {
+                self.ended = true;
+                self.inside.take()
+            }
+            _ => {
+                let stops = |w: &crate::nc::Word| w.address == "M" && matches!(w.number(), Some(2.0 | 30.0));
+                self.ended |= self.inside.is_none() && block.words().iter().any(stops);
+                self.inside.clone()
+            }
+        }
+    }
+}
+
+impl Calls {
+    pub fn add(&mut self, name: &str, block: &Block) {
+        self.bodies.entry(name.to_string()).or_default().push((block.line(), block.bytes().to_vec()));
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.bodies.is_empty()
+    }
+
+    /// A line of a sub-program as it goes out.
+    pub fn write(&self, block: &Block, out: &mut dyn Write) -> Result<()> {
+        match self.written.get(&block.line()) {
+            Some(bytes) => put_bytes(bytes, out),
+            None => put(block, out),
+        }
+    }
+
+    /// Follows a block; where it calls a sub-program of the file, its blocks as well.
+    pub fn block(
+        &mut self,
+        follower: &mut Follower,
+        block: &mut Block,
+        deep: usize,
+        out: &mut dyn Write,
+    ) -> Result<()> {
+        let (name, times) = match mark(block, follower.dialect) {
+            Mark::Call(name, times) if self.bodies.contains_key(&name) && !follower.ended => (name, times),
+            Mark::Begin(_) | Mark::End if deep > 0 || !self.bodies.is_empty() => return put(block, out),
+            Mark::Begin(name) if !name.is_empty() => {
+                let text = String::from_utf8_lossy(block.bytes()).into_owned();
+                if o_word(&text).is_some_and(|(_, w)| w.is_empty()) {
+                    return put(block, out);
+                }
+                return follower.block(block, out);
+            }
+            _ => return follower.block(block, out),
+        };
+        if deep >= DEEPEST {
+            return refuse(block, 0, CompensateFault::TooDeep { limit: DEEPEST });
+        }
+        put(block, out)?;
+        let body = self.bodies[&name].clone();
+        for _ in 0..times {
+            for (line, bytes) in &body {
+                let mut inner = Block::of_file(block.file(), *line, bytes.clone(), follower.dialect);
+                let mut written = Vec::new();
+                self.block(follower, &mut inner, deep + 1, &mut written)?;
+                if !self.collecting {
+                    continue;
+                }
+                match self.written.get(line) {
+                    Some(before) if *before != written => {
+                        return refuse(&inner, 0, CompensateFault::Contexts);
+                    }
+                    _ => {
+                        self.written.insert(*line, written);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

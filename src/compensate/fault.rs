@@ -1,0 +1,128 @@
+//! Why a program cannot be corrected as it stands, and the mend for each.
+
+/// A block whose correction matters and cannot be written.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CompensateFault {
+    /// An axis word that only the control can evaluate.
+    #[error("`{address}` is the expression `{text}`; its correction cannot be known here")]
+    Expression {
+        /// Address of the axis.
+        address: String,
+        /// As written.
+        text: String,
+    },
+    /// An increment or a preset from a place that is not known.
+    #[error("`{address}` counts from a place that the program has not said")]
+    UnknownStart {
+        /// Address of the axis.
+        address: String,
+    },
+    /// An arc, and no tolerance for lines in its place.
+    #[error("an arc that the machine's errors deform")]
+    Arc,
+    /// An arc that is none.
+    #[error("this arc cannot be followed: {what}")]
+    ArcGeometry {
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A tolerance below what the written digits hold.
+    #[error("a tolerance of {tolerance_um} um cannot be held with {decimals} decimals")]
+    ArcTolerance {
+        /// As asked for, um.
+        tolerance_um: f64,
+        /// Digits behind the point.
+        decimals: usize,
+    },
+    /// Another kind of motion.
+    #[error("{what} cannot be corrected word by word")]
+    OtherMotion {
+        /// Which, with the words that say so.
+        what: String,
+    },
+    /// A tool without known length.
+    #[error("the correction depends on the length of tool {tool}, which is not known")]
+    UnknownTool {
+        /// As the program calls it.
+        tool: String,
+    },
+    /// A work offset without known numbers.
+    #[error("the correction depends on work offset {name}, which is not known")]
+    UnknownOffset {
+        /// As the program calls it.
+        name: String,
+    },
+    /// A frame that is not followed.
+    #[error("`{what}` changes what coordinates mean in a way that is not followed")]
+    Frame {
+        /// As written.
+        what: String,
+    },
+    /// A call of something that may move.
+    #[error("`{what}` calls what is not in this file, or may move in its own way")]
+    Call {
+        /// As written.
+        what: String,
+    },
+    /// The order of blocks is not that of lines.
+    #[error("`{what}`: which block comes next is decided on the control")]
+    Jump {
+        /// As written.
+        what: String,
+    },
+    /// A block that the operator may leave out.
+    #[error("a block that may be left out moves; what follows depends on whether it does")]
+    Skipped,
+    /// A tool direction instead of rotary words.
+    #[error("`{address}` gives the tool direction as a vector; which joints the control turns is not known")]
+    ToolVector {
+        /// The address.
+        address: String,
+    },
+    /// Tool centre point programs on a machine without three linear axes X, Y, Z.
+    #[error("tool centre point coordinates cannot be reached by this machine's X, Y and Z alone")]
+    NoTcp,
+    /// A line of a sub-program that would have to read differently at every call.
+    #[error("this line belongs to a sub-program whose calls need different corrections here")]
+    Contexts,
+    /// Sub-programs that call each other without end.
+    #[error("sub-programs call each other more than {limit} deep")]
+    TooDeep {
+        /// Most levels.
+        limit: usize,
+    },
+}
+
+impl CompensateFault {
+    /// How to mend it.
+    pub fn mend(&self) -> String {
+        use CompensateFault::*;
+        match self {
+            Expression { .. } => "let the CAM system or an editor put the number in, then compensate".into(),
+            UnknownStart { address } => format!("move `{address}` to an absolute place first (G90)"),
+            Arc => "give a tolerance, such as --arcs 0.002mm: the arc is written as lines within it".into(),
+            ArcGeometry { .. } => "check start, end and centre of the arc".into(),
+            ArcTolerance { decimals, .. } => {
+                format!("give a larger tolerance, or --decimals {}", decimals + 1)
+            }
+            OtherMotion { .. } => "let the CAM system write it as G0, G1, G2, G3".into(),
+            UnknownTool { tool } => {
+                format!("give --setup FILE.ron with `tools: {{\"{tool}\": LENGTH}}` (docs/compensate.md)")
+            }
+            UnknownOffset { name } => format!(
+                "give --setup FILE.ron with `work_offsets: {{\"{name}\": {{\"X\": ..., ...}}}}` (docs/compensate.md)"
+            ),
+            Frame { .. } => "let the CAM system write coordinates without this frame".into(),
+            Call { what } => format!(
+                "put its blocks into this program; if it does not cut, give --setup FILE.ron with `calls: [\"{what}\"]`"
+            ),
+            Jump { .. } => "write the program in the order in which it runs".into(),
+            Skipped => "take the skip mark away, or the block".into(),
+            ToolVector { .. } => "let the CAM system write rotary axes instead of a vector".into(),
+            NoTcp => "program joint coordinates, tool centre point function off".into(),
+            Contexts => "put the sub-program's blocks into the program, once for each call".into(),
+            TooDeep { .. } => "end each sub-program with a return".into(),
+        }
+    }
+}

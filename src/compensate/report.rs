@@ -1,0 +1,182 @@
+//! What compensation did, for people and machines.
+
+use serde::Serialize;
+
+/// Most lines that a list names; the count beside it goes on.
+pub const MOST_LISTED: usize = 50;
+
+/// A list that names the first [`MOST_LISTED`] of its entries and counts all.
+#[derive(Clone, Debug, Serialize)]
+pub struct Listed<T> {
+    /// How many there are.
+    pub count: u64,
+    /// The first of them.
+    pub first: Vec<T>,
+    /// Line of the last.
+    #[serde(skip)]
+    last: usize,
+}
+
+impl<T> Default for Listed<T> {
+    fn default() -> Self {
+        Listed { count: 0, first: Vec::new(), last: 0 }
+    }
+}
+
+impl<T> Listed<T> {
+    /// One entry per line.
+    pub(super) fn push_once(&mut self, entry: T, line: usize) {
+        if self.last != line {
+            self.last = line;
+            self.push(entry);
+        }
+    }
+
+    pub(super) fn push(&mut self, entry: T) {
+        self.count += 1;
+        if self.first.len() < MOST_LISTED {
+            self.first.push(entry);
+        }
+    }
+}
+
+/// A figure, and the line at which it is reached.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Worst {
+    /// m or rad.
+    pub value: f64,
+    /// Line of the program, from 1; 0 where there was nothing.
+    pub line: usize,
+}
+
+impl Worst {
+    pub(super) fn take(&mut self, value: f64, line: usize) {
+        if value > self.value {
+            *self = Worst { value, line };
+        }
+    }
+}
+
+/// The correction changes at once, because the direction of travel did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reversal {
+    /// Line of the block that starts with it.
+    pub line: usize,
+    /// By how much the tip is corrected otherwise from here on, m.
+    pub step_m: f64,
+    /// By how much the tool axis is, rad.
+    pub step_rad: f64,
+}
+
+/// A joint that would leave its travel.
+#[derive(Clone, Debug, Serialize)]
+pub struct OutOfTravel {
+    /// Line of the block.
+    pub line: usize,
+    /// Name of the joint.
+    pub joint: String,
+    /// How far beyond its limit, m or rad.
+    pub by: f64,
+}
+
+/// A pose at which the joints have lost a direction.
+#[derive(Clone, Debug, Serialize)]
+pub struct SingularBlock {
+    /// Line of the block.
+    pub line: usize,
+    /// The direction in frame `w`: displacement of the tip and turn about it.
+    pub lost_w: [f64; 6],
+    /// Error of the tool axis that stays, rad.
+    pub left_rad: f64,
+}
+
+/// A pose that the corrected machine does not reach.
+#[derive(Clone, Debug, Serialize)]
+pub struct Unreached {
+    /// Line of the block.
+    pub line: usize,
+    /// Error of the tip that stays, m.
+    pub left_m: f64,
+    /// Error of the tool axis that stays, rad.
+    pub left_rad: f64,
+}
+
+/// What [`compensate`](super::compensate) did. Lengths in m, angles in rad.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Report {
+    /// Name of the machine.
+    pub machine: String,
+    /// Lines read.
+    pub blocks: u64,
+    /// Blocks that move under program coordinates, as often as they run.
+    pub moves: u64,
+    /// Blocks that move in the machine's own frame or to a reference point, left as they are.
+    pub machine_moves: u64,
+    /// Axis words with another number than before.
+    pub corrected_words: u64,
+    /// Axis words that were not there before.
+    pub inserted_words: u64,
+    /// Arcs written as lines.
+    pub split_arcs: u64,
+    /// Lines written in their place.
+    pub arc_lines: u64,
+    /// Straight moves that were subdivided.
+    pub split_moves: u64,
+    /// Drilling cycles: their places are corrected in the plane, their depths are not.
+    pub cycles: u64,
+    /// Largest error of the tip that this leaves.
+    pub largest_cycle_m: Worst,
+    /// Largest displacement of the tip by the correction.
+    pub largest_correction_m: Worst,
+    /// Largest turn of the tool axis by the correction.
+    pub largest_correction_rad: Worst,
+    /// Largest error of the tip that is left at the end of a move, rounding included, by the model.
+    pub largest_left_m: Worst,
+    /// Largest error of the tool axis that is left at the end of a move.
+    pub largest_left_rad: Worst,
+    /// Largest error of the tip that is left between the ends of a straight move.
+    pub largest_mid_line_m: Worst,
+    /// Largest distance of the lines from their arc.
+    pub largest_arc_m: Worst,
+    /// Where the correction steps because a direction of travel changed.
+    pub reversals: Listed<Reversal>,
+    /// Largest of these steps.
+    pub largest_reversal_m: Worst,
+    /// Blocks at which a joint would leave its travel.
+    pub out_of_travel: Listed<OutOfTravel>,
+    /// Blocks at which a direction of the tool is lost.
+    pub singular: Listed<SingularBlock>,
+    /// Blocks whose tip the machine does not reach.
+    pub unreachable: Listed<Unreached>,
+    /// Moves beyond what the calibration has seen.
+    pub extrapolated_moves: u64,
+    /// Addresses that the program never names; their joints were taken where they stand at the start, and
+    /// left there.
+    pub never_programmed: Vec<String>,
+    /// What the calibration has not seen of the errors of tip and tool axis at the ends of these moves;
+    /// `None` where that is not known.
+    pub unseen: Option<Unseen>,
+}
+
+/// Errors of tip and tool axis that may be left because no recording has shown them. Root mean squares over
+/// the moves, one standard deviation.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Unseen {
+    /// Of the tip, m.
+    pub tip_m: f64,
+    /// Of the tool axis, rad.
+    pub axis_rad: f64,
+    /// The deviations behind it, largest first.
+    pub patterns: Vec<UnseenPattern>,
+}
+
+/// One combination of deviations that no recording has shown.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct UnseenPattern {
+    /// Its largest components, in units of their tolerances: `c.vx`.
+    pub mostly: Vec<String>,
+    /// Of the tip, m.
+    pub tip_m: f64,
+    /// Of the tool axis, rad.
+    pub axis_rad: f64,
+}

@@ -1,0 +1,511 @@
+//! Inverse kinematics of any chain: position only, position and tool axis, or the full pose.
+//!
+//! Newton steps from a warm start, `docs/compensate.md` (C1) to (C4). Orientation comes first, by the
+//! directions that the joints still have; position follows with what that leaves free. A direction in which
+//! the joints hardly move the tool is held near the start instead of being chased, so that a correction stays
+//! small at a singular pose, and is told.
+
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+
+use crate::chain::{Chain, Sweep};
+use crate::check::random_command;
+use crate::lie::{Pose, Twist, Vec3, Wrench};
+use crate::machine::{JointKind, Machine};
+
+/// What of the goal counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// The tip: three equations.
+    Position,
+    /// The tip and the direction of the tool: five equations.
+    PositionAndAxis,
+    /// The direction of the tool: two equations.
+    Axis,
+    /// The whole pose: six equations.
+    Pose,
+}
+
+/// How hard to try.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Singular value (rad of tool direction per rad of joint, or as a part of the largest where lengths take
+    /// part) below which a direction fades out.
+    pub weak: f64,
+    /// Most Newton steps.
+    pub steps: usize,
+    /// Largest distance from the goal that counts as reached, m.
+    pub position_m: f64,
+    /// Largest angle from the goal that counts as reached, rad.
+    pub angle_rad: f64,
+    /// Whether travel is respected.
+    pub within_travel: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options { weak: 0.02, steps: 60, position_m: 1e-10, angle_rad: 1e-10, within_travel: true }
+    }
+}
+
+/// Where the tool should be.
+#[derive(Clone, Copy, Debug)]
+pub struct Goal {
+    /// The tip in frame `t`; its z axis is the tool axis.
+    pub t_from_tip: Pose<f64>,
+    /// The tip in frame `w`, as it should be; what the mode leaves out does not count.
+    pub w_from_tip: Pose<f64>,
+}
+
+/// How it ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// Every equation of the mode holds.
+    Reached,
+    /// A joint would leave its travel. It stands at its limit, and the others do what they can; where the
+    /// start lies outside already, nothing is held back.
+    OutOfTravel {
+        /// Index of the command.
+        command: usize,
+        /// How far beyond the limit the solution lies, m or rad.
+        by: f64,
+    },
+    /// At this pose the joints have lost a direction that they have elsewhere.
+    Singular {
+        /// The direction in frame `w`, unit length over all: `v` a displacement of the tip, `w` a turn about
+        /// it.
+        lost_w: Twist<f64>,
+    },
+    /// What is left cannot be reached, by this machine or from this start.
+    Unreachable,
+}
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Commands, m or rad, machine order.
+    pub commands: Vec<f64>,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Distance of the tip from the goal, m.
+    pub position_left_m: f64,
+    /// Angle of the tool axis (in [`Mode::Pose`]: of the whole orientation) from the goal, rad.
+    pub angle_left_rad: f64,
+    /// Newton steps taken.
+    pub steps: usize,
+}
+
+/// The inverse of the chains of one machine.
+#[derive(Clone, Debug)]
+pub struct Inverse<'a> {
+    machine: &'a Machine,
+    mode: Mode,
+    options: Options,
+    /// Equations of orientation that the machine has joints for on general poses.
+    turns: usize,
+    /// The same of position.
+    shifts: usize,
+    /// Whether the linear joints alone bring the tip anywhere.
+    by_slides: bool,
+}
+
+/// What one Newton step sees.
+struct Look {
+    tip: Pose<f64>,
+    /// m.
+    gap_w: Vec3<f64>,
+    /// The turn that is missing, as a rotation vector in `w`, rad.
+    turn_w: Vec3<f64>,
+    sweep: Sweep<f64>,
+}
+
+/// Directions of a task by how strongly the joints move them.
+struct Directions {
+    /// Left vectors (what moves), right vectors (with which joints), singular values.
+    parts: Vec<(DVector<f64>, DVector<f64>, f64)>,
+}
+
+impl Directions {
+    fn of(matrix: &DMatrix<f64>) -> Directions {
+        if matrix.is_empty() {
+            return Directions { parts: Vec::new() };
+        }
+        // Thin: as many as the smaller side has.
+        let svd = matrix.clone().svd(true, true);
+        let parts = match (&svd.u, &svd.v_t) {
+            (Some(u), Some(v_t)) => (0..svd.singular_values.len())
+                .map(|k| (u.column(k).into_owned(), v_t.row(k).transpose(), svd.singular_values[k]))
+                .collect(),
+            _ => Vec::new(),
+        };
+        Directions { parts }
+    }
+
+    fn largest(&self) -> f64 {
+        self.parts.iter().map(|(_, _, s)| *s).fold(0.0, f64::max)
+    }
+
+    /// (C3): along each direction the step that closes the error; a weak one is drawn back by `from_start`.
+    fn step(&self, error: &DVector<f64>, from_start: &DVector<f64>, weak: f64) -> DVector<f64> {
+        let mut step = DVector::zeros(from_start.len());
+        for (u, v, s) in &self.parts {
+            let hold = if *s < weak { 0.25 * weak * weak * (1.0 - (s / weak).powi(2)) } else { 0.0 };
+            let scale = s * s + hold;
+            if scale > 1e-24 {
+                step += v * ((s * u.dot(error) - hold * v.dot(from_start)) / scale);
+            }
+        }
+        step
+    }
+}
+
+fn unit(k: usize) -> Vec3<f64> {
+    Vec3(std::array::from_fn(|i| if i == k { 1.0 } else { 0.0 }))
+}
+
+/// Two unit vectors square to the unit vector `n` and to each other.
+fn square_to(n: Vec3<f64>) -> [Vec3<f64>; 2] {
+    let least = (0..3).min_by(|a, b| n.0[*a].abs().total_cmp(&n.0[*b].abs())).unwrap_or(0);
+    let first = n.cross(unit(least));
+    let first = first.times(first.norm().recip());
+    [first, n.cross(first)]
+}
+
+impl<'a> Inverse<'a> {
+    /// In the mode that the machine has joints for: the full pose with six independent freedoms, else
+    /// position and tool axis where joints turn the tool axis, else position.
+    pub fn new(machine: &'a Machine) -> Self {
+        let mut inverse = Inverse {
+            machine,
+            mode: Mode::Pose,
+            options: Options::default(),
+            turns: 0,
+            shifts: 0,
+            by_slides: false,
+        };
+        let (all, turns, _, _) = inverse.ranks();
+        let axis = { Inverse { mode: Mode::PositionAndAxis, ..inverse.clone() } }.ranks().1;
+        inverse.mode = match (all, turns, axis) {
+            (6.., 3.., _) => Mode::Pose,
+            (_, _, 0) => Mode::Position,
+            _ => Mode::PositionAndAxis,
+        };
+        inverse.with_mode(inverse.mode)
+    }
+
+    /// In this mode, whatever the machine has.
+    pub fn with_mode(&self, mode: Mode) -> Self {
+        let mut inverse = Inverse { mode, ..self.clone() };
+        (_, inverse.turns, inverse.shifts, inverse.by_slides) = inverse.ranks();
+        inverse
+    }
+
+    /// With other limits.
+    pub fn with_options(&self, options: Options) -> Self {
+        Inverse { options, ..self.clone() }
+    }
+
+    /// The mode in use.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Equations of the mode that this machine has joints for on general poses, of orientation and of
+    /// position.
+    pub fn freedoms(&self) -> (usize, usize) {
+        (self.turns, self.shifts)
+    }
+
+    /// Ranks over general poses: of everything, of orientation, of position, and whether linear joints alone
+    /// give position.
+    fn ranks(&self) -> (usize, usize, usize, bool) {
+        let chain = Chain::nominal(self.machine);
+        let mut rng = StdRng::seed_from_u64(5);
+        let count = self.machine.commands().len();
+        let free = vec![true; count];
+        let goal = Goal { t_from_tip: Pose::identity(0.0), w_from_tip: Pose::identity(0.0) };
+        let rank = |m: &DMatrix<f64>| {
+            let directions = Directions::of(m);
+            let largest = directions.largest();
+            directions.parts.iter().filter(|(_, _, s)| *s > 1e-6 * largest && *s > 1e-9).count()
+        };
+        let mut best = (0, 0, 0, false);
+        for _ in 0..8 {
+            let q: Vec<f64> = (0..count).map(|c| random_command(self.machine, c, &mut rng)).collect();
+            let look = self.look(&chain, &goal, &q);
+            let (turns, shifts) = (self.turn_rows(&look, &free), self.shift_rows(&look, &free));
+            let mut all = DMatrix::zeros(turns.nrows() + 3, count);
+            all.rows_mut(0, 3).copy_from(&shifts);
+            all.rows_mut(3, turns.nrows()).copy_from(&turns);
+            let slides = self.only(&shifts, JointKind::Prismatic);
+            best.0 = best.0.max(rank(&all));
+            best.1 = best.1.max(rank(&turns));
+            best.2 = best.2.max(rank(&shifts));
+            best.3 |= rank(&slides) == 3;
+        }
+        best
+    }
+
+    fn look(&self, chain: &Chain<f64>, goal: &Goal, q: &[f64]) -> Look {
+        let sweep = chain.sweep(q);
+        let tip = sweep.w_from_t() * goal.t_from_tip;
+        let gap_w = goal.w_from_tip.translation - tip.translation;
+        let turn_w = match self.mode {
+            Mode::Position => Vec3([0.0; 3]),
+            Mode::Pose => {
+                let missing = goal.w_from_tip.rotation * tip.rotation.transpose();
+                Pose { rotation: missing, translation: gap_w }.rotation_vector()
+            }
+            Mode::PositionAndAxis | Mode::Axis => {
+                let (axis, wanted) = (tip.rotation.column(2), goal.w_from_tip.rotation.column(2));
+                let cross = axis.cross(wanted);
+                let (sine, cosine) = (cross.norm(), axis.dot(wanted));
+                if sine > 1e-9 {
+                    cross.times(sine.atan2(cosine) / sine)
+                } else if cosine < 0.0 {
+                    // Opposite: any direction will do, and the smallest turn shows the way.
+                    square_to(axis)[0].times(std::f64::consts::PI)
+                } else {
+                    cross
+                }
+            }
+        };
+        Look { tip, gap_w, turn_w, sweep }
+    }
+
+    fn shift_rows(&self, look: &Look, free: &[bool]) -> DMatrix<f64> {
+        let wrenches = [0, 1, 2].map(|k| Wrench::at_point(unit(k), look.tip.translation));
+        self.rows(look, &wrenches, free)
+    }
+
+    fn turn_rows(&self, look: &Look, free: &[bool]) -> DMatrix<f64> {
+        let directions = self.turn_directions(look);
+        self.rows(look, &directions.iter().map(|n| Wrench::couple(*n)).collect::<Vec<_>>(), free)
+    }
+
+    /// The turns that count, in `w`.
+    fn turn_directions(&self, look: &Look) -> Vec<Vec3<f64>> {
+        match self.mode {
+            Mode::Position => Vec::new(),
+            Mode::PositionAndAxis | Mode::Axis => square_to(look.tip.rotation.column(2)).to_vec(),
+            Mode::Pose => [0, 1, 2].map(unit).to_vec(),
+        }
+    }
+
+    fn rows(&self, look: &Look, wrenches: &[Wrench<f64>], free: &[bool]) -> DMatrix<f64> {
+        let mut matrix = DMatrix::zeros(wrenches.len(), free.len());
+        let mut row = vec![0.0; free.len()];
+        for (k, wrench) in wrenches.iter().enumerate() {
+            look.sweep.command_row(self.machine, *wrench, &mut row);
+            for c in (0..free.len()).filter(|c| free[*c]) {
+                matrix[(k, c)] = row[c];
+            }
+        }
+        matrix
+    }
+
+    /// The columns of one kind of joint, the others zero.
+    fn only(&self, matrix: &DMatrix<f64>, kind: JointKind) -> DMatrix<f64> {
+        let mut part = matrix.clone();
+        for c in (0..part.ncols()).filter(|c| self.machine.command_joint(*c).kind != kind) {
+            part.column_mut(c).fill(0.0);
+        }
+        part
+    }
+
+    /// Commands that bring the tip to the goal, or as near as the joints can.
+    ///
+    /// `start`: commands to start from, m or rad, near the solution if possible; weak directions stay near
+    /// them. `free`: which commands may change (one per command).
+    ///
+    /// # Panics
+    /// If `start` or `free` has not one entry per command.
+    pub fn solve(&self, chain: &Chain<f64>, goal: &Goal, start: &[f64], free: &[bool]) -> Solution {
+        let count = self.machine.commands().len();
+        assert!(start.len() == count && free.len() == count, "one start and one flag per command");
+        let mut free = free.to_vec();
+        let mut from = start.to_vec();
+        let mut worst: Option<(usize, f64)> = None;
+        loop {
+            let mut solution = self.newton(chain, goal, &from, start, &free);
+            let beyond = |q: f64, c: usize| {
+                let (low, high) = self.machine.travel(c);
+                (low - q).max(q - high)
+            };
+            let out = (0..count)
+                .filter(|c| free[*c] && self.options.within_travel)
+                .map(|c| (c, beyond(solution.commands[c], c)))
+                .filter(|(_, by)| *by > 1e-12)
+                .max_by(|a, b| a.1.total_cmp(&b.1));
+            match out {
+                Some((c, by)) if beyond(start[c], c) > 0.0 => {
+                    solution.outcome = Outcome::OutOfTravel { command: c, by };
+                    return solution;
+                }
+                Some((c, by)) => {
+                    worst = worst.or(Some((c, by)));
+                    let (low, high) = self.machine.travel(c);
+                    from[c] = solution.commands[c].clamp(low, high);
+                    free[c] = false;
+                }
+                None => {
+                    if let Some((command, by)) = worst {
+                        solution.outcome = Outcome::OutOfTravel { command, by };
+                    }
+                    return solution;
+                }
+            }
+        }
+    }
+
+    fn newton(
+        &self,
+        chain: &Chain<f64>,
+        goal: &Goal,
+        from: &[f64],
+        start: &[f64],
+        free: &[bool],
+    ) -> Solution {
+        let mut q = from.to_vec();
+        let mut look = self.look(chain, goal, &q);
+        let mut steps = 0;
+        while steps < self.options.steps {
+            let close = self.left(&look);
+            // Nothing weak can be at work once both vanish.
+            if close.0 < 1e-12 && close.1 < 1e-12 {
+                break;
+            }
+            let mut step = self.step(&look, &q, start, free);
+            let longest = step.amax();
+            if longest < 1e-11 {
+                break;
+            }
+            steps += 1;
+            if longest > 0.5 {
+                step *= 0.5 / longest;
+            }
+            let merit = |look: &Look| {
+                let (position, angle) = self.left(look);
+                position.hypot(angle)
+            };
+            let mut shortened = 0;
+            loop {
+                let next: Vec<f64> = q.iter().zip(step.iter()).map(|(q, s)| q + s).collect();
+                let there = self.look(chain, goal, &next);
+                // Far from the goal a full step may overshoot; near it, and where a weak direction is drawn
+                // back, it counts.
+                if longest < 1e-2 || shortened == 6 || merit(&there) < merit(&look) {
+                    (q, look) = (next, there);
+                    break;
+                }
+                step *= 0.5;
+                shortened += 1;
+            }
+        }
+        let (position_left_m, angle_left_rad) = self.left(&look);
+        let reached = position_left_m <= self.options.position_m && angle_left_rad <= self.options.angle_rad;
+        let outcome = if reached { Outcome::Reached } else { self.missed(&look, free) };
+        Solution { commands: q, outcome, position_left_m, angle_left_rad, steps }
+    }
+
+    /// What is left of the mode's equations: m, rad.
+    fn left(&self, look: &Look) -> (f64, f64) {
+        let gap = if self.mode == Mode::Axis { 0.0 } else { look.gap_w.norm() };
+        (gap, look.turn_w.norm())
+    }
+
+    /// (C2) to (C4).
+    fn step(&self, look: &Look, q: &[f64], start: &[f64], free: &[bool]) -> DVector<f64> {
+        let from_start = DVector::from_iterator(q.len(), q.iter().zip(start).map(|(q, s)| q - s));
+        let weak = self.options.weak;
+        let shifts = self.shift_rows(look, free);
+        let gap = DVector::from_column_slice(&look.gap_w.0);
+        let directions = self.turn_directions(look);
+        let turns = self.turn_rows(look, free);
+        let turn = DVector::from_iterator(directions.len(), directions.iter().map(|n| n.dot(look.turn_w)));
+        if self.mode == Mode::Pose && !self.by_slides {
+            // Arms: all six together, lengths against a lever of 1 m.
+            let mut all = DMatrix::zeros(6, q.len());
+            all.rows_mut(0, 3).copy_from(&shifts);
+            all.rows_mut(3, 3).copy_from(&turns);
+            let error = DVector::from_iterator(6, gap.iter().chain(turn.iter()).copied());
+            let directions = Directions::of(&all);
+            return directions.step(&error, &from_start, 0.05 * weak * directions.largest());
+        }
+        let mut step = DVector::zeros(q.len());
+        let mut strong = Vec::new();
+        if !directions.is_empty() {
+            let parts = Directions::of(&turns);
+            step = parts.step(&turn, &from_start, weak);
+            strong = parts.parts.into_iter().filter(|(_, _, s)| *s >= weak).map(|(_, v, _)| v).collect();
+        }
+        if self.mode == Mode::Axis {
+            return step;
+        }
+        let gap = gap - &shifts * &step;
+        if self.by_slides {
+            let slides = Directions::of(&self.only(&shifts, JointKind::Prismatic));
+            return step + slides.step(&gap, &DVector::zeros(q.len()), 0.0);
+        }
+        // What the orientation does not need.
+        let mut left_free = shifts;
+        for v in &strong {
+            let used = &left_free * v;
+            left_free -= used * v.transpose();
+        }
+        let parts = Directions::of(&left_free);
+        let weak = 0.05 * weak * parts.largest();
+        step + parts.step(&gap, &from_start, weak)
+    }
+
+    /// Why the goal was missed: a direction lost at this pose, or one that the free joints never have.
+    fn missed(&self, look: &Look, free: &[bool]) -> Outcome {
+        let Options { weak, .. } = self.options;
+        let mut lost: Option<(f64, Twist<f64>)> = None;
+        let mut consider = |rows: DMatrix<f64>,
+                            rank: usize,
+                            weak: f64,
+                            twist: &dyn Fn(&DVector<f64>) -> Twist<f64>,
+                            error: DVector<f64>| {
+            let mut parts = Directions::of(&rows).parts;
+            parts.sort_by(|a, b| b.2.total_cmp(&a.2));
+            for (u, _, s) in parts.iter().take(rank) {
+                let left = u.dot(&error).abs();
+                if *s < weak && left > 1e-3 * error.norm() && lost.is_none_or(|(most, _)| left > most) {
+                    lost = Some((left, twist(u)));
+                }
+            }
+        };
+        let zero = Vec3([0.0; 3]);
+        let directions = self.turn_directions(look);
+        if free.iter().all(|f| *f) {
+            let turn =
+                DVector::from_iterator(directions.len(), directions.iter().map(|n| n.dot(look.turn_w)));
+            let gap = DVector::from_column_slice(&look.gap_w.0);
+            let (turns, shifts) = (self.turn_rows(look, free), self.shift_rows(look, free));
+            if self.mode == Mode::Pose && !self.by_slides {
+                let mut all = DMatrix::zeros(6, free.len());
+                all.rows_mut(0, 3).copy_from(&shifts);
+                all.rows_mut(3, 3).copy_from(&turns);
+                let weak = 0.05 * weak * Directions::of(&all).largest();
+                let error = DVector::from_iterator(6, gap.iter().chain(turn.iter()).copied());
+                consider(all, 6, weak, &|u| Twist::from_array([u[0], u[1], u[2], u[3], u[4], u[5]]), error);
+            } else {
+                let turned = |u: &DVector<f64>| {
+                    let sum = directions.iter().zip(u.iter()).fold(zero, |sum, (n, x)| sum + n.times(*x));
+                    Twist::new(zero, sum)
+                };
+                if !directions.is_empty() {
+                    consider(turns, self.turns, weak, &turned, turn);
+                }
+                if self.mode != Mode::Axis {
+                    let weak = 0.05 * weak * Directions::of(&shifts).largest();
+                    let moved = |u: &DVector<f64>| Twist::new(Vec3([u[0], u[1], u[2]]), zero);
+                    consider(shifts, self.shifts, weak, &moved, gap);
+                }
+            }
+        }
+        lost.map_or(Outcome::Unreachable, |(_, lost_w)| Outcome::Singular { lost_w })
+    }
+}
