@@ -80,6 +80,10 @@ pub(crate) struct Args {
     /// Use so many samples of each piece of the model, evenly spread, and judge it on the others
     #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     samples: Option<u64>,
+    /// Leave room for smooth error motions of every joint, over the tolerance of its frame, such as 0.03: for a model that is to hold on
+    /// other paths
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share, allow_negative_numbers = true)]
+    error_motions: f64,
     /// List every component of every deviation, not only those that the data determine
     #[arg(long)]
     all: bool,
@@ -123,7 +127,12 @@ impl Args {
             dead_bands[c] = Some(band);
         }
         let directions = (!axes.is_empty()).then(|| Directions::new(axes));
-        Ok(Model { varying: Varying { directions, terms: Vec::new() }, dead_bands, samples: self.samples })
+        Ok(Model {
+            varying: Varying { directions, terms: Vec::new() },
+            dead_bands,
+            samples: self.samples,
+            error_motions: self.error_motions,
+        })
     }
 
     fn options(&self) -> Options {
@@ -169,6 +178,14 @@ fn command(machine: &Machine, name: &str) -> Outcome<usize> {
         what: format!("\"{name}\" is no axis of {}", machine.name()),
         mend: format!("its axes are {}", machine.commands().join(", ")),
     })
+}
+
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        _ => Err("expected a number from 0 to 1".into()),
+    }
 }
 
 /// A number above zero.
