@@ -5,11 +5,13 @@
 
 mod align;
 mod evaluator;
+mod evidence;
 mod fit;
 mod information;
 mod judge;
 mod linear;
 mod loss;
+mod motions;
 mod normal;
 mod solve;
 mod source;
@@ -42,6 +44,7 @@ pub use crate::rms::Rms;
 use crate::units::Quantity;
 use crate::variation::{Variation, Varying};
 use information::Information as Info;
+use motions::Motions;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
 use thin::Thin;
@@ -73,8 +76,13 @@ pub struct Model {
     pub dead_bands: Vec<Option<f64>>,
     /// As many samples of each piece are used, evenly spread; the others judge the result.
     pub samples: Option<u64>,
+    /// Room for smooth error motions of every joint, over the tolerance of its dyad, `docs/model.md` (32); 0 for none. They are no part
+    /// of the model, but do not bend it either.
+    pub error_motions: f64,
 }
 
+/// Direction parts other than play: factors on their prior among which the data choose.
+const BUT_PLAY: [f64; 5] = [1.0, 0.3, 0.1, 0.03, 0.01];
 /// Rounds of re-estimating the noise from the residuals.
 const NOISE_ROUNDS: usize = 12;
 
@@ -111,7 +119,7 @@ pub fn calibrate_model(
     }
     enough_to_start(machine, &sources)?;
     enough_for_setups(&sources)?;
-    let layout = Layout::new(machine, &sources, varying);
+    let layout = Layout::new(machine, &sources, varying, 1.0);
     let alone: usize = layout.blocks.iter().filter(|b| !b.prior).map(|b| b.len).sum();
     if sources.readings() <= alone as u64 {
         return Err(Error::Undetermined {
@@ -137,7 +145,24 @@ pub fn calibrate_model(
     problem.loss = options.loss;
     problem.prior = prior;
     problem.free = vec![true; layout.len];
-    let found = settle(&problem, options.solver, placed.unknowns, noise)?;
+    if prior {
+        problem.motions = Motions::new(machine, &sources, model.error_motions);
+    }
+    let mut found = settle(&problem, options.solver, placed.unknowns, noise)?;
+    let fitting = |but_play: f64| Layout::new(machine, &sources, varying, but_play);
+    let candidates = || BUT_PLAY.into_iter().map(|factor| (factor, fitting(factor)));
+    let but_play = match &varying.directions {
+        // Without room for error motions, those would speak for direction parts.
+        Some(_) if problem.motions.len() > 0 => {
+            evidence::smallest_likely(&found.solution, &layout, candidates())
+        }
+        _ => 1.0,
+    };
+    let layout = fitting(but_play);
+    problem.layout = &layout;
+    if but_play != 1.0 {
+        found = settle(&problem, options.solver, found.solution.unknowns, found.noise)?;
+    }
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
     let information = Info::new(&found.solution.normal.matrix, &layout, prior, open);
     let mut calibrated = calibrated(machine, &sources, &found);
@@ -176,7 +201,7 @@ pub fn fit_setup(
     let dead_bands: Vec<_> = variation.dead_bands.iter().map(|band| Some(*band)).collect();
     let sources = Sources::new(recordings, machine, varying, &dead_bands, &|_| {})?;
     enough_for_setups(&sources)?;
-    let layout = Layout::new(machine, &sources, varying);
+    let layout = Layout::new(machine, &sources, varying, 1.0);
     let mut problem = Problem::new(machine, &sources, &layout, varying, |block| {
         !matches!(block.role, Role::Dyad(_) | Role::Part { .. } | Role::Term(_))
     });
@@ -257,7 +282,7 @@ pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
     let varying = Varying::default();
     let sources = Sources::new(recordings, machine, &varying, &[], &|_| {})?;
     enough_to_start(machine, &sources)?;
-    let layout = Layout::new(machine, &sources, &varying);
+    let layout = Layout::new(machine, &sources, &varying, 1.0);
     let mut problem = Problem::new(machine, &sources, &layout, &varying, is_of_setup);
     let Placed { solution: placed, .. } =
         place(&mut problem, Unknowns::nominal(machine, &sources, &varying))?;
@@ -319,7 +344,10 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
     let mut seen = noise.clone();
     for _ in 0..NOISE_ROUNDS {
         seen = noise_left(problem, &solution.normal, &noise);
-        let next = with_stated(problem.sources, &seen);
+        let mut next = with_stated(problem.sources, &seen);
+        if problem.motions.len() > 0 {
+            next.iter_mut().for_each(Noise::count_half);
+        }
         let changed = noise.iter().zip(&next).any(|(a, b)| {
             let differs = |x: f64, y: f64| (x - y).abs() > 3e-3 * y;
             differs(a.length, b.length) || differs(a.angle, b.angle)
@@ -345,7 +373,7 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
         Info::new(&normal.matrix, problem.layout, problem.prior, problem.frozen.clone()).used
     } else {
         problem.free.iter().filter(|f| **f).count() as f64
-    };
+    } + normal.used_by_motions;
     let kinds: Vec<_> = sources.iter().map(source::Source::noise_group).collect();
     let rows = normal.tallies.iter().map(|t| t.length.inliers + t.angle.inliers).sum::<u64>() as f64;
     // Every scalar row bears its part of the parameters that are used up.

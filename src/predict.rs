@@ -50,6 +50,9 @@ pub struct Prediction {
     /// Samples with a pattern of directions of travel that the calibration has not seen; they are predicted from what single
     /// directions have shown.
     pub unseen_directions: u64,
+    /// The names of those patterns, such as `AFCR`; `0` is an axis that never moves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unseen_pieces: Vec<String>,
 }
 
 /// Sums over residual norms of one kind.
@@ -130,7 +133,8 @@ pub fn predict(
     }
     let mut work = evaluator.workspace();
     let (mut lengths, mut angles) = (Sums::default(), Sums::default());
-    let (mut dropped, mut extrapolated, mut unseen) = (0, 0, 0);
+    let (mut dropped, mut extrapolated) = (0, 0);
+    let mut unseen = vec![0u64; evaluator.piece_count()];
     let (commands, values) = (machine.commands().len(), recording.value_count());
     for block in recording.rows_with_text()? {
         let block = block?;
@@ -141,7 +145,8 @@ pub fn predict(
                 let measured = &block.chunk.values[k * values..(k + 1) * values];
                 extrapolated += u64::from(calibrated.extrapolates(q));
                 let moment = if varying.is_constant() { Moment::Still } else { path.next()? };
-                unseen += u64::from(!variation.has_seen(evaluator.piece(moment)));
+                let piece = evaluator.piece(moment);
+                unseen[piece] += u64::from(!variation.has_seen(piece));
                 let residuals = evaluator.residuals(q, measured, moment, &mut work, None);
                 let residuals = &residuals[..sensor.reading_count()];
                 match &sensor {
@@ -178,7 +183,14 @@ pub fn predict(
         mean_rad,
         mean_abs_rad,
         extrapolated_samples: extrapolated,
-        unseen_directions: unseen,
+        unseen_directions: unseen.iter().sum(),
+        unseen_pieces: match &variation.varying.directions {
+            Some(directions) => {
+                let pieces = unseen.iter().enumerate().filter(|(_, n)| **n > 0);
+                pieces.map(|(piece, _)| directions.name(machine, piece)).collect()
+            }
+            None => Vec::new(),
+        },
     })
 }
 

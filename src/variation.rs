@@ -190,8 +190,8 @@ impl Directions {
         names.join(" and ")
     }
 
-    /// Standard deviation of the part of `set` on dyad `j`, m and rad.
-    pub fn tolerance(&self, machine: &Machine, set: usize, j: usize) -> [f64; 6] {
+    /// Standard deviation of the part of `set` on dyad `j`, m and rad; `but_play` is a factor on everything but play.
+    pub fn tolerance(&self, machine: &Machine, set: usize, j: usize, but_play: f64) -> [f64; 6] {
         let tolerance = machine.tolerance(j).to_array();
         let own = match self.sets[set][..] {
             [i] => machine.drive(j).is_some_and(|d| matches!(d.terms[..], [(c, _)] if c == self.axes[i])),
@@ -199,12 +199,12 @@ impl Directions {
         };
         let xi = match &machine.dyads()[j].joint {
             Some(joint) if own => joint.twist(),
-            _ => return tolerance.map(|t| ELSEWHERE * t),
+            _ => return tolerance.map(|t| but_play * ELSEWHERE * t),
         };
         let along = xi.to_array();
         std::array::from_fn(|k| {
             let share = along[k].abs();
-            tolerance[k] * (ALONG * share).hypot(ACROSS * (1.0 - share * share).max(0.0).sqrt())
+            tolerance[k] * (ALONG * share).hypot(but_play * ACROSS * (1.0 - share * share).max(0.0).sqrt())
         })
     }
 }

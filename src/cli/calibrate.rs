@@ -78,8 +78,12 @@ pub(crate) struct Args {
     #[arg(long, value_name = "AXIS=SIZE", value_delimiter = ',')]
     dead_band: Vec<String>,
     /// Use so many samples of each piece of the model, evenly spread, and judge it on the others
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = whole, allow_negative_numbers = true)]
     samples: Option<u64>,
+    /// Leave room for smooth error motions of every joint, over the tolerance of its frame, such as 0.03: for a model that is to hold on
+    /// other paths
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share, allow_negative_numbers = true)]
+    error_motions: f64,
     /// List every component of every deviation, not only those that the data determine
     #[arg(long)]
     all: bool,
@@ -114,16 +118,23 @@ impl Args {
             let Some(band) = measure(size, quantity).filter(|band| *band >= 0.0) else {
                 let what = format!("--dead-band {text} is not an axis with a size");
                 let units = Unit::symbols_of(quantity);
-                let mend = format!(
-                    "write {name}=SIZE with one of the units {units}, such as {name}=0.01{}",
-                    units.split(' ').next_back().unwrap_or("")
-                );
+                let own = match quantity {
+                    Quantity::Angle => machine.units().angle,
+                    _ => machine.units().length,
+                };
+                let mend =
+                    format!("write {name}=SIZE with one of the units {units}, such as {name}=0.01{own}");
                 return Err(Failure::Told { what, mend });
             };
             dead_bands[c] = Some(band);
         }
         let directions = (!axes.is_empty()).then(|| Directions::new(axes));
-        Ok(Model { varying: Varying { directions, terms: Vec::new() }, dead_bands, samples: self.samples })
+        Ok(Model {
+            varying: Varying { directions, terms: Vec::new() },
+            dead_bands,
+            samples: self.samples,
+            error_motions: self.error_motions,
+        })
     }
 
     fn options(&self) -> Options {
@@ -169,6 +180,19 @@ fn command(machine: &Machine, name: &str) -> Outcome<usize> {
         what: format!("\"{name}\" is no axis of {}", machine.name()),
         mend: format!("its axes are {}", machine.commands().join(", ")),
     })
+}
+
+/// A whole number above zero.
+fn whole(text: &str) -> Result<u64, String> {
+    text.parse().ok().filter(|n| *n > 0).ok_or_else(|| "expected a whole number above zero".into())
+}
+
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        _ => Err("expected a number from 0 to 1".into()),
+    }
 }
 
 /// A number above zero.
@@ -275,7 +299,7 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
     for p in shown {
         let mut name = if p.setup.is_empty() { p.frame.clone() } else { format!("{}[{}]", p.frame, p.setup) };
         if !p.directions.is_empty() {
-            let _ = write!(name, " ± with {}", p.directions);
+            let _ = write!(name, ", direction of {}", p.directions);
         }
         let kind = if p.component.starts_with('v') { Kind::Length } else { Kind::Angle };
         let (value, error, unit) = kind.show_with_error(p.value, p.std_error);

@@ -79,5 +79,12 @@ fn render(p: &Prediction, name: &str) -> String {
             count(p.extrapolated_samples, "sample", "samples")
         ));
     }
+    if p.unseen_directions > 0 {
+        text.push_str(&format!(
+            "note: at {} the axes travel in a pattern of directions that the calibration has not seen ({}); it is predicted from what single directions have shown\n",
+            count(p.unseen_directions, "sample", "samples"),
+            p.unseen_pieces.join(", ")
+        ));
+    }
     text
 }

@@ -3,6 +3,8 @@
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
 use crate::lie::Twist;
+use crate::motion::Tracker;
+use crate::variation::Directions;
 
 /// A machine that is told where it is sent, one commanded position after the other.
 ///
@@ -36,7 +38,83 @@ pub trait Model {
 
 /// The model of a calibrated machine.
 pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Box<dyn Model + '_> {
-    Box::new(Constant { calibrated, chain: calibrated.chain() })
+    match &calibrated.variation().varying.directions {
+        Some(directions) => Box::new(Pieces::new(calibrated, directions)),
+        None => Box::new(Constant { calibrated, chain: calibrated.chain() }),
+    }
+}
+
+/// One set of deviations for each pattern of directions of travel.
+///
+/// An axis that has not moved yet has no direction: the mean of both holds for it.
+struct Pieces<'a> {
+    calibrated: &'a CalibratedMachine,
+    directions: &'a Directions,
+    chains: Vec<Chain<f64>>,
+    tracker: Tracker,
+    piece: usize,
+}
+
+impl<'a> Pieces<'a> {
+    fn new(calibrated: &'a CalibratedMachine, directions: &'a Directions) -> Self {
+        let machine = calibrated.machine();
+        let chain = |piece: usize| {
+            let parts = calibrated.variation().direction_part(piece, machine.dyads().len());
+            let dh: Vec<Twist<f64>> =
+                calibrated.deviations().iter().zip(&parts).map(|(dh, part)| *dh + *part).collect();
+            Chain::new(machine, &dh)
+        };
+        Pieces {
+            calibrated,
+            directions,
+            chains: (0..directions.piece_count()).map(chain).collect(),
+            tracker: at_rest(calibrated),
+            piece: directions.piece(&vec![0; machine.commands().len()]),
+        }
+    }
+}
+
+/// Nothing has moved yet.
+fn at_rest(calibrated: &CalibratedMachine) -> Tracker {
+    let bands = calibrated.variation().dead_bands.clone();
+    let first = vec![0; bands.len()];
+    Tracker::new(bands, first)
+}
+
+impl Model for Pieces<'_> {
+    fn advance(&mut self, commands: &[f64]) {
+        self.tracker.advance(commands, |_| None);
+        self.piece = self.directions.piece(&self.tracker.directions());
+    }
+
+    fn chain(&self) -> &Chain<f64> {
+        &self.chains[self.piece]
+    }
+
+    fn piece(&self) -> usize {
+        self.piece
+    }
+
+    fn is_nominal(&self) -> bool {
+        is_zero(self.calibrated.deviations())
+            && self.calibrated.variation().parts.iter().all(|part| is_zero(part))
+    }
+
+    fn extrapolates(&self, commands: &[f64]) -> bool {
+        self.calibrated.extrapolates(commands)
+    }
+
+    fn restart(&mut self) {
+        self.tracker = at_rest(self.calibrated);
+    }
+
+    fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
+        self.calibrated.unseen()
+    }
+}
+
+fn is_zero(deviations: &[Twist<f64>]) -> bool {
+    deviations.iter().all(|dh| dh.to_array().iter().all(|x| *x == 0.0))
 }
 
 /// One set of deviations everywhere.
@@ -57,7 +135,7 @@ impl Model for Constant<'_> {
     }
 
     fn is_nominal(&self) -> bool {
-        self.calibrated.deviations().iter().all(|dh| dh.to_array().iter().all(|x| *x == 0.0))
+        is_zero(self.calibrated.deviations())
     }
 
     fn extrapolates(&self, commands: &[f64]) -> bool {

@@ -455,7 +455,7 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let limits: Vec<f64> =
         sources.all.iter().map(|s| chance_limit(s.sensor.reading_count(), sources.samples())).collect();
-    let loss = problem.loss;
+    let (loss, motions) = (problem.loss, &problem.motions);
     let (mut outliers, mut all) = (0, Vec::new());
     sources.pass(
         |index, stretch| {
@@ -464,11 +464,20 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
             let sigmas = sigmas(source, machine, found.noise[index]);
             let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
             let mut work = evaluator.workspace();
+            let own_width = evaluator.width();
+            let mut rows = vec![0.0; if motions.len() > 0 { count * own_width } else { 0 }];
+            let mut columns = vec![0.0; motions.len()];
             let (mut beyond, mut own) = (0, Vec::new());
             for k in 0..chunk.len {
                 let q = stretch.q(k);
                 let measured = &chunk.values[k * width..(k + 1) * width];
-                let residuals = evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, None);
+                let with_rows = (motions.len() > 0).then_some(&mut rows[..]);
+                let mut residuals =
+                    evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, with_rows);
+                for (i, row) in rows.chunks_exact(own_width).enumerate() {
+                    motions.columns(machine, q, row, &mut columns);
+                    residuals[i] -= columns.iter().zip(&unknowns.motions).map(|(x, y)| x * y).sum::<f64>();
+                }
                 let e2 = standardised(&residuals[..count], &sigmas);
                 let (_, weight) = loss.at(e2);
                 beyond += u64::from(e2 > limits[index]);

@@ -78,7 +78,7 @@ pub(crate) fn linear(
     let sources = Sources::new(recordings, machine, &varying, &model.dead_bands, progress)?;
     enough_to_start(machine, &sources)?;
     enough_for_setups(&sources)?;
-    let layout = Layout::new(machine, &sources, &varying);
+    let layout = Layout::new(machine, &sources, &varying, 1.0);
     let mut problem = Problem::new(machine, &sources, &layout, &varying, is_of_setup);
     problem.progress = progress;
     let start = Unknowns::nominal(machine, &sources, &varying);

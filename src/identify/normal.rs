@@ -6,6 +6,7 @@ use rand::rngs::StdRng;
 
 use super::evaluator::{EXTRAS, Evaluator, Moment};
 use super::loss::Loss;
+use super::motions::{Motions, eliminate};
 use super::source::{Source, Sources};
 use super::stretch::Stretch;
 use super::thin::Thin;
@@ -29,6 +30,12 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
+    /// So that every reading counts half as much.
+    pub fn count_half(&mut self) {
+        self.length *= std::f64::consts::SQRT_2;
+        self.angle *= std::f64::consts::SQRT_2;
+    }
+
     pub fn of(self, quantity: Quantity) -> f64 {
         if quantity == Quantity::Angle { self.angle } else { self.length }
     }
@@ -92,17 +99,23 @@ pub(crate) struct Normal {
     pub gradient: DVector<f64>,
     pub loss: f64,
     pub tallies: Vec<Tally>,
+    /// Best values of the error motions, which are eliminated from the rest, and the number of parameters that they have used up.
+    pub motions: Vec<f64>,
+    pub used_by_motions: f64,
 }
 
 /// Samples with a smaller weight say nothing about the noise.
 const COUNTS: f64 = 0.25;
 impl Normal {
-    fn zero(layout: &Layout, sources: usize) -> Self {
+    fn zero(layout: &Layout, motions: &Motions, sources: usize) -> Self {
+        let len = layout.len + motions.len();
         Normal {
-            matrix: DMatrix::zeros(layout.len, layout.len),
-            gradient: DVector::zeros(layout.len),
+            matrix: DMatrix::zeros(len, len),
+            gradient: DVector::zeros(len),
             loss: 0.0,
             tallies: vec![Tally::default(); sources],
+            motions: Vec::new(),
+            used_by_motions: 0.0,
         }
     }
 }
@@ -118,7 +131,7 @@ pub(crate) fn sigmas(source: &Source, machine: &Machine, noise: Noise) -> Vec<f6
     (0..source.sensor.reading_count()).map(|i| noise.of(source.quantity(machine, i))).collect()
 }
 
-/// What one chunk adds, by piece of the model; local columns: six of each dyad, the extras, the terms.
+/// What one chunk adds, by piece of the model; local columns: six of each dyad, the extras, the terms, the error motions.
 struct Part {
     pieces: Vec<Option<Piece>>,
     loss: f64,
@@ -156,35 +169,61 @@ pub(crate) fn accumulate(
     unknowns: &Unknowns,
     noise: &[Noise],
     loss: Loss,
+    motions: &Motions,
 ) -> Result<Normal> {
+    let mut values = unknowns.motions.clone();
+    values.resize(motions.len(), 0.0);
+    let room = Room { motions, values: &values };
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let mut sums: Vec<Option<Part>> = sources.all.iter().map(|_| None).collect();
     sources.pass(
         |index, stretch| {
             let sigmas = sigmas(&sources.all[index], machine, noise[index]);
-            part(&evaluators[index], &sources.all[index], stretch, &sigmas, loss)
+            part(&evaluators[index], &sources.all[index], stretch, &sigmas, loss, room)
         },
         |index, part| match &mut sums[index] {
             None => sums[index] = Some(part),
             Some(sum) => sum.add(part),
         },
     )?;
-    let mut normal = Normal::zero(layout, sources.all.len());
+    let mut normal = Normal::zero(layout, motions, sources.all.len());
     for (index, sum) in sums.into_iter().enumerate() {
         let Some(sum) = sum else { continue };
         normal.take(sum, index, &evaluators[index], layout, &sources.all[index], unknowns);
     }
+    if motions.len() > 0 {
+        let rest = eliminate(&normal.matrix, &normal.gradient, &values);
+        normal.loss -= rest.gain;
+        (normal.matrix, normal.gradient) = (rest.matrix, rest.gradient);
+        (normal.motions, normal.used_by_motions) = (rest.values, rest.used);
+    }
     Ok(normal)
 }
 
-fn part(evaluator: &Evaluator, source: &Source, stretch: &Stretch, sigmas: &[f64], loss: Loss) -> Part {
-    let (count, width) = (source.sensor.reading_count(), evaluator.width());
+/// Error motions with their present values.
+#[derive(Clone, Copy)]
+pub(crate) struct Room<'a> {
+    pub motions: &'a Motions,
+    pub values: &'a [f64],
+}
+
+fn part(
+    evaluator: &Evaluator,
+    source: &Source,
+    stretch: &Stretch,
+    sigmas: &[f64],
+    loss: Loss,
+    room: Room,
+) -> Part {
+    let (count, own_width) = (source.sensor.reading_count(), evaluator.width());
+    let width = own_width + room.motions.len();
     let chunk = &stretch.chunk;
     let values = source.recording.value_count();
     let piece_count = evaluator.piece_count();
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); piece_count];
     (0..chunk.len).for_each(|k| members[evaluator.piece(Moment::At(stretch, k))].push(k));
     let mut work = evaluator.workspace();
+    let mut plain = vec![0.0; count * own_width];
     let mut total = 0.0;
     let mut tally = Tally { samples: chunk.len as u64, ..Tally::default() };
     let angular = source_is_angle(source, evaluator.machine);
@@ -195,9 +234,15 @@ fn part(evaluator: &Evaluator, source: &Source, stretch: &Stretch, sigmas: &[f64
             let q = stretch.q(*k);
             let measured = &chunk.values[k * values..(k + 1) * values];
             let own = &mut rows.as_mut_slice()[slot * count * width..(slot + 1) * count * width];
-            let residuals =
-                evaluator.residuals(q, measured, Moment::At(stretch, *k), &mut work, Some(&mut *own));
-            let residuals = &residuals[..count];
+            let raw = evaluator.residuals(q, measured, Moment::At(stretch, *k), &mut work, Some(&mut plain));
+            let mut left = raw;
+            for (i, plain) in plain.chunks_exact(own_width).enumerate() {
+                let (row, columns) = own[i * width..(i + 1) * width].split_at_mut(own_width);
+                row.copy_from_slice(plain);
+                room.motions.columns(evaluator.machine, q, row, columns);
+                left[i] -= columns.iter().zip(room.values).map(|(x, y)| x * y).sum::<f64>();
+            }
+            let residuals = &left[..count];
             let (rho, weight) = loss.at(standardised(residuals, sigmas));
             total += count as f64 * rho;
             tally.down_weighted += u64::from(weight < 0.5);
@@ -208,7 +253,7 @@ fn part(evaluator: &Evaluator, source: &Source, stretch: &Stretch, sigmas: &[f64
                 let angle = count == 6 && i >= 3 || count == 1 && angular;
                 let sums = if angle { &mut tally.angle } else { &mut tally.length };
                 sums.rows += 1;
-                sums.squares += residual * residual;
+                sums.squares += raw[i] * raw[i];
                 // The noise is that of the samples that the model claims to describe.
                 if weight > COUNTS {
                     sums.inliers += 1;
@@ -261,7 +306,7 @@ impl Normal {
             }
             let factors: Vec<f64> =
                 directions.map_or(Vec::new(), |d| (0..d.sets().len()).map(|s| d.factor(s, at)).collect());
-            self.scatter(&piece, evaluator.machine, layout, source, &factors);
+            self.scatter(&piece, evaluator, layout, source, &factors);
         }
         self.loss += sum.loss;
         self.tallies[index] = sum.tally;
@@ -269,7 +314,15 @@ impl Normal {
 
     /// Adds local sums where their unknowns stand in the parameter vector; a column of a dyad counts for its constant deviation
     /// and, times the set's factor, for each of its direction parts.
-    fn scatter(&mut self, sum: &Piece, machine: &Machine, layout: &Layout, source: &Source, factors: &[f64]) {
+    fn scatter(
+        &mut self,
+        sum: &Piece,
+        evaluator: &Evaluator,
+        layout: &Layout,
+        source: &Source,
+        factors: &[f64],
+    ) {
+        let machine = evaluator.machine;
         let dyads = machine.dyads().len();
         let mut places: Vec<Vec<(usize, f64)>> = vec![Vec::new(); sum.gradient.len()];
         let mut put = |local: usize, len: usize, role: Role, factor: f64| {
@@ -293,8 +346,11 @@ impl Normal {
         if let Some(i) = source.length.unknown() {
             put(6 * dyads + 4, 1, Role::Length(i), 1.0);
         }
-        for local in 6 * dyads + EXTRAS..sum.gradient.len() {
+        for local in 6 * dyads + EXTRAS..evaluator.width() {
             put(local, 1, Role::Term(local - 6 * dyads - EXTRAS), 1.0);
+        }
+        for (i, place) in places[evaluator.width()..].iter_mut().enumerate() {
+            place.push((layout.len + i, 1.0));
         }
         for (a, to) in places.iter().enumerate() {
             for (to_a, factor_a) in to {
@@ -325,7 +381,7 @@ pub(crate) fn set_up_geometry(
     thin: &[Thin],
 ) -> DMatrix<f64> {
     let w = 6 * machine.w_index();
-    let mut normal = Normal::zero(layout, sources.all.len());
+    let mut normal = Normal::zero(layout, &Motions::default(), sources.all.len());
     for (index, source) in sources.all.iter().enumerate() {
         let evaluator = Evaluator::new(machine, unknowns, source);
         let width = evaluator.width();
@@ -348,7 +404,7 @@ pub(crate) fn set_up_geometry(
                 matrix.ger(each_stands_for / (sigma * sigma), &row, &row, 1.0);
             }
         }
-        normal.scatter(&Piece { matrix, gradient: DVector::zeros(width) }, machine, layout, source, &[]);
+        normal.scatter(&Piece { matrix, gradient: DVector::zeros(width) }, &evaluator, layout, source, &[]);
     }
     normal.matrix
 }
@@ -362,7 +418,7 @@ pub(crate) fn matrix_in_general(
 ) -> DMatrix<f64> {
     let mut rng = StdRng::seed_from_u64(20_260_104);
     let (samples, commands) = (2 * layout.len, machine.commands().len());
-    let mut normal = Normal::zero(layout, sources.all.len());
+    let mut normal = Normal::zero(layout, &Motions::default(), sources.all.len());
     for (index, source) in sources.all.iter().enumerate() {
         let evaluator = Evaluator::new(machine, unknowns, source);
         let chunk = Chunk {
@@ -378,7 +434,8 @@ pub(crate) fn matrix_in_general(
         let features = unknowns.varying.features().map(|_| vec![0.0; samples]).collect();
         let stretch = Stretch { chunk, motion, features, commands };
         let sigmas = vec![1.0; source.sensor.reading_count()];
-        let part = part(&evaluator, source, &stretch, &sigmas, Loss::Squares);
+        let none = Room { motions: &Motions::default(), values: &[] };
+        let part = part(&evaluator, source, &stretch, &sigmas, Loss::Squares, none);
         normal.take(part, index, &evaluator, layout, source, unknowns);
     }
     normal.matrix

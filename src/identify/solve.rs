@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::information::open_directions;
 use super::loss::Loss;
+use super::motions::Motions;
 use super::normal::{Noise, Normal, accumulate, set_up_geometry};
 use super::source::Sources;
 use super::thin::Thin;
@@ -77,6 +78,8 @@ pub(crate) struct Problem<'a> {
     pub prior: bool,
     /// Which parameters may move.
     pub free: Vec<bool>,
+    /// Error motions that room is left for.
+    pub motions: Motions,
     /// Directions in the scaled parameter vector along which nothing moves: the data leave them open, and would only fit noise there.
     pub frozen: Vec<DVector<f64>>,
     /// Told what the solver is at, before every pass over the data.
@@ -115,13 +118,14 @@ impl<'a> Problem<'a> {
             loss: Loss::default(),
             prior: true,
             free: layout.mask(free),
+            motions: Motions::default(),
             frozen: Vec::new(),
             progress: &|_| {},
         }
     }
 
     pub fn normal(&self, unknowns: &Unknowns, noise: &[Noise]) -> Result<Normal> {
-        accumulate(self.machine, self.sources, self.layout, unknowns, noise, self.loss)
+        accumulate(self.machine, self.sources, self.layout, unknowns, noise, self.loss, &self.motions)
     }
 
     /// What the data leave open of the set-ups; `least` is the information that counts.
@@ -213,6 +217,7 @@ impl<'a> Problem<'a> {
         let scales = self.layout.scales();
         let mut unknowns = start;
         let mut normal = self.normal(&unknowns, noise)?;
+        unknowns.motions.clone_from(&normal.motions);
         let mut objective = normal.loss + self.penalty(&unknowns);
         let (mut damping, mut growth) = (None, 2.0);
         let mut steps = 0;
@@ -243,8 +248,9 @@ impl<'a> Problem<'a> {
                 steps += 1;
                 (self.progress)(&format!("step {steps}, objective {objective:.6e}"));
                 let step = self.full(&(&eigen.eigenvectors * &amounts), &scales);
-                let next = unknowns.stepped(self.layout, &step);
+                let mut next = unknowns.stepped(self.layout, &step);
                 let next_normal = self.normal(&next, noise)?;
+                next.motions.clone_from(&next_normal.motions);
                 let next_objective = next_normal.loss + self.penalty(&next);
                 let gain = (objective - next_objective) / promised;
                 if next_objective.is_finite() && gain > 0.0 {
@@ -279,6 +285,7 @@ impl<'a> Problem<'a> {
         };
         let mut unknowns = start;
         let mut normal = self.normal(&unknowns, noise)?;
+        unknowns.motions.clone_from(&normal.motions);
         for steps in 0..most {
             (self.progress)(&format!("step {}", steps + 1));
             let (matrix, gradient) = self.scaled(&normal, &unknowns, &scales);
@@ -286,6 +293,7 @@ impl<'a> Problem<'a> {
             unknowns = unknowns.stepped(self.layout, &self.full(&step, &scales));
             let before = normal.loss;
             normal = self.normal(&unknowns, noise)?;
+            unknowns.motions.clone_from(&normal.motions);
             let settled = (before - normal.loss).abs() <= SETTLED * before;
             if settled && !matches!(solver, Solver::FixedDamping { .. }) {
                 return Ok(Solution { unknowns, normal, stop: Stop::Converged, steps: steps + 1 });

@@ -48,8 +48,9 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Every dyad but `w`, then frames, tool points, zeros and lengths of the set-ups, then what varies.
-    pub fn new(machine: &Machine, sources: &Sources, varying: &Varying) -> Self {
+    /// Every dyad but `w`, then frames, tool points, zeros and lengths of the set-ups, then what varies. `but_play` is a factor on the
+    /// prior of direction parts other than play.
+    pub fn new(machine: &Machine, sources: &Sources, varying: &Varying, but_play: f64) -> Self {
         let mut layout = Layout { blocks: Vec::new(), len: 0 };
         let tolerance = |j| machine.tolerance(j).to_array();
         for j in (0..machine.dyads().len()).filter(|j| *j != machine.w_index()) {
@@ -83,7 +84,7 @@ impl Layout {
         if let Some(directions) = &varying.directions {
             for set in 0..directions.sets().len() {
                 for dyad in 0..machine.dyads().len() {
-                    let scale = directions.tolerance(machine, set, dyad);
+                    let scale = directions.tolerance(machine, set, dyad, but_play);
                     layout.push(Role::Part { set, dyad }, 6, scale, true);
                 }
             }
@@ -156,6 +157,8 @@ pub(crate) struct Unknowns {
     pub parts: Vec<Vec<Twist<f64>>>,
     /// Coefficients of the terms.
     pub coefficients: Vec<f64>,
+    /// Error motions that room is left for, over their standard deviations; not in the parameter vector. Empty: all zero.
+    pub motions: Vec<f64>,
 }
 
 impl Unknowns {
@@ -179,6 +182,7 @@ impl Unknowns {
                 varying.directions.as_ref().map_or(0, |d| d.sets().len())
             ],
             coefficients: vec![0.0; varying.terms.len()],
+            motions: Vec::new(),
         }
     }
 
