@@ -114,6 +114,7 @@ impl Case {
             },
             "sigma_mm": world.sigma.0 * 1e3,
             "sigma_rad": world.sigma.1,
+            "reads_angle": world.reads_angle(),
             "tests": tests,
             "rho": self.noise.rho,
             "outliers": self.noise.outliers,

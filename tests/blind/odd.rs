@@ -115,17 +115,14 @@ pub fn draw(body: &Body, track: &Track, random: &mut Random) -> Option<(Effect, 
             on_reading("odd_chirp", (0..n).map(value).collect(), frequencies)
         }
         "beating" => {
-            // A vibration whose strength wanders through zero.
+            // A vibration whose strength wanders through zero and whose phase wanders too: no few fixed frequencies make it up.
             let f = random.between(0.2 * fast, 0.8 * fast);
-            let beats: Vec<(f64, f64)> =
-                (0..6).map(|_| (random.normal() * 0.15, random.between(0.0, TAU))).collect();
+            let (strength, phase) = (smooth(random), smooth(random));
             let value = |k: usize| {
-                let t = track.time[k];
-                beats.iter().map(|(df, p)| (TAU * (f + df) * t + p).sin()).sum::<f64>()
+                let (t, age) = (track.time[k], track.age(k));
+                strength(age) * (TAU * f * t + 4.0 * phase(age)).sin()
             };
-            let span = track.seen_s();
-            let mut frequencies: Vec<f64> = beats.iter().map(|(df, _)| f + df).collect();
-            frequencies.extend((-40..=40).map(|i| f + i as f64 * 0.5 / span));
+            let frequencies = (-60..=60).map(|i| f + f64::from(i) * 0.5 / track.seen_s()).collect();
             on_reading("odd_beating", (0..n).map(value).collect(), frequencies)
         }
         _ => {
@@ -152,4 +149,12 @@ pub fn draw(body: &Body, track: &Track, random: &mut Random) -> Option<(Effect, 
             on_reading("odd_bursts", (0..n).map(value).collect(), frequencies)
         }
     }
+}
+
+/// A smooth random course over [0, 1] that changes sign a dozen times or more.
+fn smooth(random: &mut Random) -> impl Fn(f64) -> f64 + use<> {
+    let waves: Vec<(f64, f64, f64)> = (0..24)
+        .map(|_| (random.normal() / 4.0, random.between(0.0, 30.0), random.between(0.0, TAU)))
+        .collect();
+    move |u| waves.iter().map(|(a, k, p)| a * (TAU * k * u + p).sin()).sum()
 }

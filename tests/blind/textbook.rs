@@ -38,19 +38,25 @@ impl Hints {
 
 /// Shares of all families, largest first. `y`: the misfit beyond geometry, in units of the noise.
 pub fn shares(answers: &Answers, y: &DVector<f64>, hints: &Hints) -> Vec<Share> {
+    ranked(answers, y, hints).into_iter().map(|(share, _)| share).collect()
+}
+
+/// The same, each with the columns that explain so much.
+pub fn ranked(answers: &Answers, y: &DVector<f64>, hints: &Hints) -> Vec<(Share, Vec<DVector<f64>>)> {
     let track = &answers.world.track;
     let places = all_places(&answers.world.body, track);
-    let mut all: Vec<Share> = places
-        .into_iter()
-        .map(|(name, place)| {
-            let best = candidates(answers, name, place, hints)
-                .iter()
-                .map(|columns| answers.share(y, columns))
-                .fold(0.0, f64::max);
-            Share { name, place, share: best }
-        })
-        .collect();
-    all.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let best_of = |name, place| {
+        let mut best = (Share { name, place, share: 0.0 }, Vec::new());
+        for columns in candidates(answers, name, place, hints) {
+            let share = answers.share(y, &columns);
+            if share > best.0.share {
+                best = (Share { name, place, share }, columns);
+            }
+        }
+        best
+    };
+    let mut all: Vec<_> = places.into_iter().map(|(name, place)| best_of(name, place)).collect();
+    all.sort_by(|a, b| b.0.share.total_cmp(&a.0.share));
     all
 }
 

@@ -154,12 +154,20 @@ impl<'a> Answers<'a> {
         for j in 0..links {
             for c in 0..6 {
                 let mut e = [0.0; 6];
-                e[c] = if c < 3 { 15e-6 } else { 40e-6 };
+                // Ten times what machines are given: what needs more than that, no calibration would believe.
+                e[c] = if c < 3 { 150e-6 } else { 400e-6 };
                 columns.push(self.before(j, |_| e));
             }
         }
-        // 15 um that do not reach a thousandth of the noise are not seen by any fit.
-        orthonormal(&columns, 1e-9)
+        let matrix = DMatrix::from_columns(&columns);
+        let eigen = (matrix.transpose() * &matrix).symmetric_eigen();
+        // Combinations that all samples together see better than that are free, the others are not.
+        let of_all = self.world.track.recorded as f64 / self.samples.len() as f64;
+        let seen: Vec<DVector<f64>> = (0..columns.len())
+            .filter(|i| eigen.eigenvalues[*i] * of_all > 1.0)
+            .map(|i| &matrix * eigen.eigenvectors.column(i) / eigen.eigenvalues[i].sqrt())
+            .collect();
+        if seen.is_empty() { DMatrix::zeros(self.rows(), 0) } else { DMatrix::from_columns(&seen) }
     }
 
     fn twisted(&self, j: usize, behind: bool, at: impl Fn(usize) -> [f64; 6]) -> DVector<f64> {
@@ -254,6 +262,14 @@ impl<'a> Answers<'a> {
     /// What geometry cannot absorb of it.
     pub fn beyond_geometry(&self, y: &DVector<f64>) -> DVector<f64> {
         y - &self.geometry * (self.geometry.transpose() * y)
+    }
+
+    /// Counts further columns among what geometry absorbs.
+    pub fn absorb(&mut self, columns: &[DVector<f64>]) {
+        let mut all: Vec<DVector<f64>> = self.geometry.column_iter().map(|c| c.into_owned()).collect();
+        let beyond: Vec<DVector<f64>> = columns.iter().map(|c| self.beyond_geometry(c)).collect();
+        all.extend(orthonormal(&beyond, 1e-10).column_iter().map(|c| c.into_owned()));
+        self.geometry = DMatrix::from_columns(&all);
     }
 
     /// Share of `y` (already beyond geometry) that the span of these columns explains.
