@@ -1,0 +1,182 @@
+//! The blind harness as a command: writes cases whose effects nobody knows but `answers.json`, and judges the engine on them.
+//!
+//! ```text
+//! cargo run --release --example blind -- --write DIR --kind standard --count 40 --seed 1
+//! cargo run --release --example blind -- --judge DIR --kind standard
+//! cargo run --release --example blind -- --report docs/diagnosis.md --count 200 --seed 1
+//! ```
+
+#[path = "../tests/blind/mod.rs"]
+mod harness;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, ValueEnum};
+
+use harness::baseline::Baseline;
+use harness::case::{Kind, Mode};
+use harness::table;
+use harness::verdict::{Diagnoser, Engine};
+
+/// Blind cases: write them, judge the engine on them.
+#[derive(Parser)]
+struct Arguments {
+    /// Writes cases into this folder.
+    #[arg(long, value_name = "DIR")]
+    write: Option<PathBuf>,
+    /// Diagnoses the answered cases of this folder and prints the table.
+    #[arg(long, value_name = "DIR")]
+    judge: Option<PathBuf>,
+    /// Draws `--count` cases of each kind, diagnoses them and writes the tables to this file.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+    /// Judges a baseline in place of the engine.
+    #[arg(long, value_enum)]
+    baseline: Option<Baselines>,
+    /// The `kincal` binary to judge; by default the one built beside this example.
+    #[arg(long, value_name = "FILE")]
+    binary: Option<PathBuf>,
+    /// Passes `--without NAME` to `kincal diagnose`.
+    #[arg(long, value_name = "NAME")]
+    without: Vec<String>,
+    /// Textbook shapes and white noise, or neither.
+    #[arg(long, value_enum, default_value = "standard")]
+    kind: Kinds,
+    /// How many cases.
+    #[arg(long, default_value_t = 40)]
+    count: usize,
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Only cases that conceal this much.
+    #[arg(long, value_enum)]
+    only: Option<Modes>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Kinds {
+    Standard,
+    Hard,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Modes {
+    Clean,
+    One,
+    Two,
+    Odd,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Baselines {
+    /// One effect at a time, ranked by share.
+    Ranked,
+    /// Forward by BIC.
+    Stepwise,
+    Lasso,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = run(&arguments);
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<(), String> {
+    let kind = match arguments.kind {
+        Kinds::Standard => Kind::Standard,
+        Kinds::Hard => Kind::Hard,
+    };
+    let mode = arguments.only.map(|mode| match mode {
+        Modes::Clean => Mode::Clean,
+        Modes::One => Mode::One,
+        Modes::Two => Mode::Two,
+        Modes::Odd => Mode::Odd,
+    });
+    if let Some(folder) = &arguments.write {
+        harness::write(folder, kind, mode, arguments.seed, arguments.count)?;
+    }
+    if let Some(folder) = &arguments.judge {
+        let score = match arguments.baseline {
+            Some(Baselines::Ranked) => harness::judge(folder, &Baseline::Ranked)?,
+            Some(Baselines::Stepwise) => harness::judge(folder, &Baseline::Stepwise)?,
+            Some(Baselines::Lasso) => harness::judge(folder, &Baseline::Lasso)?,
+            None => harness::judge(folder, &engine(arguments)?)?,
+        };
+        println!("{}", table::terminal(&score, kind));
+    }
+    if let Some(file) = &arguments.report {
+        let text = report(arguments)?;
+        std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))?;
+    }
+    if arguments.write.is_none() && arguments.judge.is_none() && arguments.report.is_none() {
+        return Err("nothing to do: give --write DIR, --judge DIR or --report FILE".into());
+    }
+    Ok(())
+}
+
+fn engine(arguments: &Arguments) -> Result<Engine, String> {
+    let beside = || -> Option<PathBuf> {
+        let own = std::env::current_exe().ok()?;
+        Some(own.parent()?.parent()?.join(format!("kincal{}", std::env::consts::EXE_SUFFIX)))
+    };
+    let binary = arguments.binary.clone().or_else(beside).filter(|b| b.exists());
+    let binary = binary
+        .ok_or("no kincal binary beside this example: cargo build --release first, or give --binary FILE")?;
+    let mut engine = Engine::new(binary);
+    for name in &arguments.without {
+        engine.extra.extend(["--without".to_string(), name.clone()]);
+    }
+    Ok(engine)
+}
+
+/// Draws both kinds into a folder of its own, judges, and renders what came out.
+fn report(arguments: &Arguments) -> Result<String, String> {
+    let folder = std::env::temp_dir().join(format!("kincal-blind-report-{}", std::process::id()));
+    let engine = engine(arguments)?;
+    let (count, seed) = (arguments.count, arguments.seed);
+    let mut out = String::from("# Diagnosis: blind cases\n\n");
+    let _ = writeln!(
+        out,
+        "Written by `cargo run --release --example blind -- --report docs/diagnosis.md --count {count} --seed {seed}`.\n"
+    );
+    let made = both(&folder, &engine, count, seed, &mut out);
+    let _ = std::fs::remove_dir_all(&folder);
+    made.map(|()| out)
+}
+
+fn both(folder: &Path, engine: &Engine, count: usize, seed: u64, out: &mut String) -> Result<(), String> {
+    for (kind, word) in [(Kind::Standard, "standard"), (Kind::Hard, "hard")] {
+        let own = folder.join(word);
+        harness::write(&own, kind, None, seed, count)?;
+        let score = harness::judge(&own, engine)?;
+        let _ = writeln!(out, "## {word}: {} cases\n\n{}", score.cases, table::markdown(&score, kind));
+        let _ = writeln!(out, "{}\n{}", table::confusion(&score), table::calibration(&score));
+        let methods = [Baseline::Ranked, Baseline::Stepwise, Baseline::Lasso];
+        let mut others = Vec::new();
+        for method in methods {
+            others.push((method.name(), harness::judge(&own, &method)?));
+        }
+        let _ = writeln!(
+            out,
+            "### What other methods say of the same cases\n\nThey are given the generator's own textbook, which the engine does not know.\n\n{}",
+            table::side_by_side(&others, kind)
+        );
+        if !score.broken.is_empty() {
+            let _ = writeln!(
+                out,
+                "{} cases could not be diagnosed: {}\n",
+                score.broken.len(),
+                score.broken.join("; ")
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,167 @@
+//! What a diagnosis says of a case, and the engine behind the command line. Neither ever sees an answer.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use serde_json::Value;
+
+/// The files of a case that may be looked at.
+#[derive(Clone, Debug)]
+pub struct CaseFiles {
+    pub label: String,
+    pub machine: PathBuf,
+    pub recordings: Vec<PathBuf>,
+    /// The noise-free path that nobody fits.
+    pub judge: Option<PathBuf>,
+}
+
+/// One named effect.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    pub effect: String,
+    pub at: String,
+    pub probability: f64,
+    /// Name, value, standard error.
+    pub coefficients: Vec<(String, f64, f64)>,
+    pub confusable: Vec<(String, String)>,
+}
+
+#[derive(Clone, Debug, Default)]
+pub struct Verdict {
+    pub findings: Vec<Finding>,
+    /// Where something is left that has no name.
+    pub unexplained: Option<String>,
+    /// RMS on data not used for the fit, with everything found modelled, m or rad.
+    pub held_out: Option<f64>,
+    /// RMS error on the judge's path: plain calibration, diagnosed model.
+    pub judged: Option<(f64, f64)>,
+    pub seconds: f64,
+    pub samples: f64,
+}
+
+/// Anything that diagnoses.
+pub trait Diagnoser: Sync {
+    fn name(&self) -> String;
+
+    /// # Errors
+    /// What went wrong, in words.
+    fn diagnose(&self, case: &CaseFiles) -> Result<Verdict, String>;
+}
+
+/// `kincal diagnose`, one core a case.
+pub struct Engine {
+    /// The `kincal` binary.
+    pub binary: PathBuf,
+    /// Folder for its outputs.
+    pub scratch: PathBuf,
+    /// Further arguments of `diagnose`, such as `--without NAME`.
+    pub extra: Vec<String>,
+    /// Whether the diagnosed model is tried on the judge's path.
+    pub judged: bool,
+}
+
+impl Engine {
+    pub fn new(binary: PathBuf) -> Self {
+        let scratch = std::env::temp_dir().join(format!("kincal-blind-{}", std::process::id()));
+        Engine { binary, scratch, extra: Vec::new(), judged: true }
+    }
+
+    fn call(&self, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<(), String> {
+        let mut command = Command::new(&self.binary);
+        arguments.iter().for_each(|a| {
+            command.arg(a);
+        });
+        command.arg("--quiet").env("RAYON_NUM_THREADS", "1");
+        let out = command.output().map_err(|e| format!("{}: {e}", self.binary.display()))?;
+        if out.status.success() {
+            return Ok(());
+        }
+        let said = String::from_utf8_lossy(&out.stderr);
+        Err(said.lines().next().unwrap_or("it failed and said nothing").to_string())
+    }
+
+    fn predicted(&self, calibrated: &Path, judge: &Path) -> Result<f64, String> {
+        let (csv, json) = (calibrated.with_extension("csv"), calibrated.with_extension("json"));
+        self.call(&[&"predict", &calibrated, &judge, &"-o", &csv, &"--json", &json])?;
+        let read = read_json(&json)?;
+        rms(&read).ok_or_else(|| "predict told no RMS".to_string())
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.scratch);
+    }
+}
+
+/// `rms_m`, or `rms_rad` of an angle.
+fn rms(value: &Value) -> Option<f64> {
+    value["rms_m"].as_f64().or_else(|| value["rms_rad"].as_f64())
+}
+
+fn read_json(file: &Path) -> Result<Value, String> {
+    let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
+    serde_json::from_str(&text).map_err(|e| format!("{}: {e}", file.display()))
+}
+
+impl Diagnoser for Engine {
+    fn name(&self) -> String {
+        "kincal diagnose".into()
+    }
+
+    fn diagnose(&self, case: &CaseFiles) -> Result<Verdict, String> {
+        let own = self.scratch.join(&case.label);
+        std::fs::create_dir_all(&own).map_err(|e| format!("{}: {e}", own.display()))?;
+        let (model, json) = (own.join("diagnosed.ron"), own.join("diagnosis.json"));
+        let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"diagnose", &case.machine];
+        case.recordings.iter().for_each(|r| arguments.push(r));
+        arguments.extend([&"--json" as &dyn AsRef<std::ffi::OsStr>, &json, &"-o", &model]);
+        self.extra.iter().for_each(|a| arguments.push(a));
+        let started = Instant::now();
+        self.call(&arguments)?;
+        let seconds = started.elapsed().as_secs_f64();
+        let mut verdict = Verdict::read(&read_json(&json)?);
+        verdict.seconds = seconds;
+        if let (true, Some(judge)) = (self.judged, &case.judge) {
+            let plain = own.join("plain.ron");
+            let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"calibrate", &case.machine];
+            case.recordings.iter().for_each(|r| arguments.push(r));
+            arguments.extend([&"-o" as &dyn AsRef<std::ffi::OsStr>, &plain]);
+            self.call(&arguments)?;
+            verdict.judged = Some((self.predicted(&plain, judge)?, self.predicted(&model, judge)?));
+        }
+        let _ = std::fs::remove_dir_all(&own);
+        Ok(verdict)
+    }
+}
+
+impl Verdict {
+    /// From the JSON of `contract.md` section 3.
+    pub fn read(json: &Value) -> Self {
+        let text = |v: &Value| v.as_str().unwrap_or_default().to_string();
+        let list = |v: &Value| v.as_array().cloned().unwrap_or_default();
+        let finding = |f: &Value| Finding {
+            effect: text(&f["effect"]),
+            at: text(&f["at"]),
+            probability: f["probability"].as_f64().unwrap_or(f64::NAN),
+            coefficients: list(&f["coefficients"])
+                .iter()
+                .filter_map(|c| Some((text(&c["name"]), c["value"].as_f64()?, c["std_error"].as_f64()?)))
+                .collect(),
+            confusable: list(&f["confusable_with"])
+                .iter()
+                .map(|c| (text(&c["effect"]), text(&c["at"])))
+                .collect(),
+        };
+        let held = ["held_out_rms_m", "held_out_rms_rad"];
+        Verdict {
+            findings: list(&json["findings"]).iter().map(finding).collect(),
+            unexplained: (!json["unexplained"].is_null()).then(|| text(&json["unexplained"]["at"])),
+            held_out: held.iter().find_map(|h| json[*h]["final"].as_f64()),
+            judged: None,
+            seconds: 0.0,
+            samples: json["samples"].as_f64().unwrap_or(0.0),
+        }
+    }
+}
