@@ -7,6 +7,7 @@ mod describe;
 mod location;
 mod output;
 mod predict;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -30,6 +31,8 @@ enum Command {
     Calibrate(calibrate::Args),
     /// What a calibrated machine says the instrument would read, sample by sample
     Predict(predict::Args),
+    /// Recordings of a machine whose errors are known: standard tests, random poses, NC programs
+    Simulate(Box<simulate::Args>),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
     Demo(demo::Args),
 }
@@ -52,6 +55,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Predict(args) => predict::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     match outcome {

@@ -100,6 +100,14 @@ pub enum Error {
         /// What would help.
         mend: String,
     },
+    /// A motion that the machine cannot make.
+    #[error("{what}")]
+    Motion {
+        /// Which, and where it fails.
+        what: String,
+        /// What would help.
+        mend: String,
+    },
 }
 
 impl Error {
@@ -109,7 +117,9 @@ impl Error {
             Error::Machine { fault, .. } => fault.mend(),
             Error::Recording { fault, .. } => fault.mend(),
             Error::Nc { fault, .. } => fault.mend(),
-            Error::Ron { mend, .. } | Error::Undetermined { mend, .. } => mend.clone(),
+            Error::Ron { mend, .. } | Error::Undetermined { mend, .. } | Error::Motion { mend, .. } => {
+                mend.clone()
+            }
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
             }
@@ -124,7 +134,7 @@ impl Error {
             | Error::Recording { place, .. }
             | Error::Nc { place, .. }
             | Error::Ron { place, .. } => Some(place),
-            Error::File { .. } | Error::Undetermined { .. } => None,
+            Error::File { .. } | Error::Undetermined { .. } | Error::Motion { .. } => None,
         }
     }
 
