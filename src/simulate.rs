@@ -4,12 +4,13 @@
 //! | --- | --- |
 //! | [`Faults`] | what is wrong with a machine, from RON |
 //! | [`Plant`] | the machine with all that, and the deviations that hold at a sample |
-//! | [`Course`] | what it is commanded to do: [`Turning`] (tests over an angle) |
+//! | [`Course`] | what it is commanded to do: [`Turning`] (tests over an angle), [`RandomPoses`], [`PartProgram`], [`CommandTable`] |
 //! | [`Instrument`] | what is read, with noise, resolution and drop-outs |
 //! | [`Recorder`] | the recording as it is written |
 //!
 //! A [`Session`] puts them together; `docs/simulate.md` teaches `kincal simulate`.
 
+mod commands;
 mod cone;
 mod course;
 mod faults;
@@ -17,10 +18,13 @@ mod follow;
 mod instrument;
 mod inverse;
 mod paper;
+mod part_program;
 mod plant;
+mod poses;
 mod profile;
 mod program_out;
 mod record;
+mod segment;
 mod standard;
 mod turning;
 mod turns;
@@ -37,13 +41,16 @@ use crate::error::Result;
 use crate::lie::Twist;
 use crate::machine::Machine;
 
+pub use commands::CommandTable;
 pub use cone::cone;
 pub use course::{At, Course, Sample, Samples};
 pub use faults::{Faults, Width};
 pub use instrument::{Instrument, Scatter, noise_of};
 pub use inverse::inverse;
 pub use paper::paper_path;
+pub use part_program::{Drive, PartProgram};
 pub use plant::{Plant, State};
+pub use poses::RandomPoses;
 pub use profile::{Leg, Pace, Profile, ticks};
 pub use program_out::write_program;
 pub use record::{Claims, Recorder, Style, Written};

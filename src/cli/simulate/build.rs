@@ -5,8 +5,9 @@ use kincal::lie::{Pose, Twist, Vec3};
 use kincal::machine::{JointKind, Machine};
 use kincal::sensor::Sensor;
 use kincal::simulate::{
-    Balls, Claims, Course, Family, Faults, Figure, Instrument, Pace, Plant, Pointing, Rounding, Run,
-    Sense as Turn, Standard, Turning, Turns, plane_across, plane_of_axes, rest, usual_range,
+    Balls, Claims, CommandTable, Course, Drive, Family, Faults, Figure, Instrument, Pace, PartProgram, Plant,
+    Pointing, RandomPoses, Rounding, Run, Sense as Turn, Standard, Turning, Turns, plane_across,
+    plane_of_axes, rest, usual_range,
 };
 use kincal::units::{Quantity, amount};
 
@@ -61,8 +62,7 @@ pub(super) fn build(args: &Args, machine: &CalibratedMachine) -> Outcome<Built> 
             };
             let relative = measure == Measure::Distance;
             let (instrument, claims) = instrument(args, machine, measure, &balls)?;
-            let course = course(args, machine, balls)?;
-            let directions = args.test.sort() == Sort::Poses;
+            let (course, directions) = course(args, machine, balls)?;
             runs.push(Run { course, instrument, claims, directions });
             lengths.push(
                 (relative || matches!(args.test.sort(), Sort::Cone | Sort::Rotary | Sort::Circle))
@@ -281,17 +281,63 @@ fn rotary_axis(args: &Args, machine: &Machine) -> Outcome<usize> {
     }
 }
 
-fn course(args: &Args, machine: &Machine, balls: Balls) -> Outcome<Box<dyn Course>> {
+/// The motion, and whether it has directions of approach.
+fn course(args: &Args, machine: &Machine, balls: Balls) -> Outcome<(Box<dyn Course>, bool)> {
     match args.test.sort() {
         Sort::Rotary | Sort::Cone | Sort::Circle => {
             let held = held(args, machine)?;
             let figure = figure(args, machine, &held)?;
             let legs = turns(args, machine, &figure, &balls)?.legs();
             let rounding = Rounding { direction_decimals: args.bar_decimals, rotary_step: args.rotary_step };
-            Ok(Box::new(Turning::new(machine, figure, balls, &held, legs, args.rate, rounding)?))
+            Ok((Box::new(Turning::new(machine, figure, balls, &held, legs, args.rate, rounding)?), false))
         }
-        _ => Err(usage("not built yet", "")),
+        Sort::Poses => {
+            let (count, seed) = (args.count.unwrap_or(200), args.seed.wrapping_add(0x706f_7365));
+            Ok((Box::new(RandomPoses { machine: machine.clone(), count, seed, rate: args.rate }), true))
+        }
+        Sort::Program => {
+            let held = held(args, machine)?;
+            Ok((Box::new(PartProgram::new(input(args)?, machine, drive(args, &balls)?, held)), false))
+        }
+        Sort::Path => {
+            let table = CommandTable::open(input(args)?, machine, args.rate)?;
+            let directions = table.has_directions();
+            Ok((Box::new(table), directions))
+        }
     }
+}
+
+fn input(args: &Args) -> Outcome<&std::path::Path> {
+    let needs = || {
+        let what = if args.test == Test::Program { "an NC program" } else { "a table of commands" };
+        usage(format!("the test `{}` needs {what}", args.test.word()), "add --input FILE")
+    };
+    args.input.as_deref().ok_or_else(needs)
+}
+
+fn drive(args: &Args, balls: &Balls) -> Outcome<Drive> {
+    let length = |option: &str, rate: Option<Rate>, default: f64| match rate {
+        None => Ok(default),
+        Some(rate) if rate.quantity == Quantity::Length => Ok(rate.si),
+        Some(_) => Err(usage(
+            format!("`{option}` of a program is a length over a time"),
+            "write 1000mm/min, 0.5m/s^2",
+        )),
+    };
+    if args.feed.len() > 1 {
+        return Err(usage("`--feed` takes one feed for a program", "give one"));
+    }
+    Ok(Drive {
+        tool_centre_point: args.tcp.map(|tcp| tcp == OnOff::On),
+        tool_point_t: balls.tool_point_t,
+        feed: length("--feed", args.feed.first().copied(), 1.0 / 60.0)?,
+        rapid: length("--rapid", args.rapid, 20.0 / 60.0)?,
+        rapid_rotary: 180f64.to_radians(),
+        acceleration: length("--acceleration", args.acceleration, 0.5)?,
+        rotary_acceleration: 1000f64.to_radians(),
+        corner: args.corner.unwrap_or(5f64.to_radians()),
+        rate: args.rate,
+    })
 }
 
 fn turns(args: &Args, machine: &Machine, figure: &Figure, balls: &Balls) -> Outcome<Turns> {
