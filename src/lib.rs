@@ -31,7 +31,7 @@
 //! | [`CalibratedMachine`] | a machine file with its deviations |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
-//! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known |
+//! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known: faults, tests, instruments |
 //!
 //! # A complete example
 //!

@@ -47,7 +47,7 @@ pub use course::{At, Course, Sample, Samples};
 pub use faults::{Faults, Width};
 pub use instrument::{Instrument, Scatter, noise_of};
 pub use inverse::inverse;
-pub use paper::paper_path;
+pub use paper::{paper_path, paper_plant};
 pub use part_program::{Drive, PartProgram};
 pub use plant::{Plant, State};
 pub use poses::RandomPoses;

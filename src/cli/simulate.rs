@@ -31,7 +31,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         .flatten()
         .cloned()
         .collect();
-    check_outputs(&outputs, &inputs)?;
+    check_outputs(&outputs, &[])?;
     let machine = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let progress = args.common.progress();
     progress.say("solving the path");
@@ -43,7 +43,15 @@ pub(crate) fn run(args: &Args) -> Outcome {
         drop_out: if args.drop_out_as == DropAs::Nan { "NaN" } else { "" },
     };
     let files = names(&args.output, runs.len());
-    check_outputs(&files.iter().map(|f| Some(f.as_path())).collect::<Vec<_>>(), &inputs)?;
+    for output in outputs.into_iter().flatten().chain(files.iter().map(PathBuf::as_path)) {
+        let same = |input: &&PathBuf| matches!((output.canonicalize(), input.canonicalize()), (Ok(a), Ok(b)) if a == b);
+        if let Some(input) = inputs.iter().find(same) {
+            return Err(usage(
+                format!("{}: would be overwritten, and it is an input", input.display()),
+                "give the output another name",
+            ));
+        }
+    }
     let mut session = Session::new(&plant, &runs, &style, args.pause, args.seed)?;
     let mut all: Vec<Written> = Vec::new();
     for file in &files {

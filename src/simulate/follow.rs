@@ -31,7 +31,7 @@ pub(super) fn follow(
         let sweep = chain.sweep(q);
         let p = sweep.w_from_t().transform(point_t);
         let gap = target_w - p;
-        if gap.norm() < 1e-15 || gap.norm() >= left {
+        if gap.norm() < 1e-15 || gap.norm() >= left || linear.is_empty() {
             return left.min(gap.norm());
         }
         left = gap.norm();

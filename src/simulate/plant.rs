@@ -116,15 +116,15 @@ impl Plant {
                 false => actual[*j] * Pose::exp(*d),
             };
         }
-        for (j, offset) in &faults.displacements {
-            if let Some(joint) = &dyads[*j].joint {
-                actual[*j] = actual[*j] * Pose::exp(joint.twist().times(*offset));
-            }
-        }
         for (j, d) in &faults.twists {
             // A joint is never the last dyad of its branch.
             actual[*j] = actual[*j] * Pose::exp(*d);
             actual[*j + 1] = Pose::exp(-*d) * actual[*j + 1];
+        }
+        for (j, offset) in &faults.displacements {
+            if let Some(joint) = &dyads[*j].joint {
+                actual[*j] = actual[*j] * Pose::exp(joint.twist().times(*offset));
+            }
         }
         let touched =
             !(faults.factors.is_empty() && faults.displacements.is_empty() && faults.twists.is_empty());

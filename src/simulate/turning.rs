@@ -258,6 +258,12 @@ impl Turning {
                     return Ok(vec![self.start.clone()]);
                 }
                 self.by_all = true;
+                if self.balls.tool_point_t.0[..2] != [0.0, 0.0] {
+                    return Err(motion(
+                        "with all joints, a circle is solved for a tool ball on the z axis of frame t only",
+                        "give the tool ball as 0,0,Z",
+                    ));
+                }
                 let (p_w, chain) =
                     (self.tool_frame_target(self.circle(plane_w, first), tool_axis_w), &self.chain);
                 let tries = std::iter::once(self.start.clone()).chain(random_commands(&self.machine, 60, 1));

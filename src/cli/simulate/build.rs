@@ -49,10 +49,9 @@ pub(super) fn build(args: &Args, machine: &CalibratedMachine) -> Outcome<Built> 
     for length in &all_lengths {
         for height in &all_heights {
             let mut ball = args.ball.unwrap_or(Vec3([0.0; 3]));
-            let up = if args.test == Test::Circle {
-                circle_plane(args, machine, &rest(machine))?.1
-            } else {
-                Vec3([0.0, 0.0, 1.0])
+            let up = match args.test {
+                Test::Circle => circle_plane(args, machine, &held(args, machine)?)?.1,
+                _ => Vec3([0.0, 0.0, 1.0]),
             };
             ball = ball + up.times(*height);
             let balls = Balls {
