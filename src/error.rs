@@ -100,6 +100,16 @@ pub enum Error {
         /// What would help.
         mend: String,
     },
+    /// Faults, an NC program or a table of commands that a simulation cannot use.
+    #[error("{place}: {message}")]
+    Simulation {
+        /// Where in the file.
+        place: Place,
+        /// What is wrong.
+        message: String,
+        /// How to mend it.
+        mend: String,
+    },
     /// A motion that the machine cannot make.
     #[error("{what}")]
     Motion {
@@ -117,9 +127,10 @@ impl Error {
             Error::Machine { fault, .. } => fault.mend(),
             Error::Recording { fault, .. } => fault.mend(),
             Error::Nc { fault, .. } => fault.mend(),
-            Error::Ron { mend, .. } | Error::Undetermined { mend, .. } | Error::Motion { mend, .. } => {
-                mend.clone()
-            }
+            Error::Ron { mend, .. }
+            | Error::Simulation { mend, .. }
+            | Error::Undetermined { mend, .. }
+            | Error::Motion { mend, .. } => mend.clone(),
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
             }
@@ -133,7 +144,8 @@ impl Error {
             Error::Machine { place, .. }
             | Error::Recording { place, .. }
             | Error::Nc { place, .. }
-            | Error::Ron { place, .. } => Some(place),
+            | Error::Ron { place, .. }
+            | Error::Simulation { place, .. } => Some(place),
             Error::File { .. } | Error::Undetermined { .. } | Error::Motion { .. } => None,
         }
     }

@@ -130,7 +130,8 @@ fn summary(
         let kind = machine.command_joint(c).kind;
         let (scale, unit) =
             if kind == JointKind::Prismatic { (1e3, "mm") } else { (1f64.to_degrees(), "deg") };
-        let show = |x: f64| format!("{:.3}", x * scale + 0.0);
+        // Rounded first: -0.000 is written as zero.
+        let show = |x: f64| format!("{:.3}", (x * scale * 1e3).round() / 1e3 + 0.0);
         let limit = |x: f64| {
             if x.is_finite() { format!("{}", (x * scale * 1e6).round() / 1e6) } else { "no limit".into() }
         };

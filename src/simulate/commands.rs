@@ -41,7 +41,7 @@ impl CommandTable {
     /// Opens a table and reads its header. `rate`: samples a second where there is no column `t`.
     ///
     /// # Errors
-    /// [`Error::File`], or [`Error::Ron`] with line and column for a column that cannot be used or a joint without one.
+    /// [`Error::File`], or [`Error::Simulation`] with line and column for a column that cannot be used or a joint without one.
     pub fn open(path: impl AsRef<Path>, machine: &Machine, rate: f64) -> Result<CommandTable> {
         let path = path.as_ref().to_path_buf();
         let mut table = CommandTable {
@@ -96,7 +96,11 @@ impl CommandTable {
         message: impl Into<String>,
         mend: impl Into<String>,
     ) -> Error {
-        Error::Ron { place: Place::at(&self.path, line, column), message: message.into(), mend: mend.into() }
+        Error::Simulation {
+            place: Place::at(&self.path, line, column),
+            message: message.into(),
+            mend: mend.into(),
+        }
     }
 
     fn lines(&self) -> Result<impl Iterator<Item = Result<(usize, String)>> + Send + use<>> {
@@ -110,7 +114,7 @@ impl CommandTable {
                 Ok(0) => None,
                 Ok(_) => match String::from_utf8(bytes) {
                     Ok(text) => Some(Ok((number, text))),
-                    Err(_) => Some(Err(Error::Ron {
+                    Err(_) => Some(Err(Error::Simulation {
                         place: Place::at(&path, number, 0),
                         message: "text is not UTF-8".into(),
                         mend: "save the table as plain text in UTF-8".into(),

@@ -75,7 +75,7 @@ impl Faults {
     /// Reads a faults file for a machine.
     ///
     /// # Errors
-    /// [`Error::File`], or [`Error::Ron`] with line and column.
+    /// [`Error::File`], [`Error::Ron`] or [`Error::Simulation`], the last two with line and column.
     pub fn open(path: impl AsRef<Path>, machine: &Machine) -> Result<Faults> {
         Faults::from_document(&Document::open(path)?, machine)
     }
@@ -90,7 +90,7 @@ impl Faults {
 
     fn from_document(document: &Document, machine: &Machine) -> Result<Faults> {
         let form: FaultsForm = document.read()?;
-        Reader { machine, form: &form }.faults().map_err(|Fail { path, message, mend }| Error::Ron {
+        Reader { machine, form: &form }.faults().map_err(|Fail { path, message, mend }| Error::Simulation {
             place: document.place_of(&path),
             message,
             mend,

@@ -12,7 +12,9 @@ use crate::chain::Chain;
 use crate::error::{Error, Place, Result};
 use crate::lie::Vec3;
 use crate::machine::{JointKind, Machine};
-use crate::nc::{Block, Coordinate, Feed, How, Motion, MotionKind, Plane, Program, State, Step, Units, Why};
+use crate::nc::{
+    Block, Coordinate, Feed, How, Kind, Motion, MotionKind, Plane, Program, State, Step, Token, Units, Why,
+};
 
 /// Blocks that the speed is planned ahead for; the path can stop behind them.
 const AHEAD: usize = 256;
@@ -122,7 +124,11 @@ impl PartProgram {
     }
 
     fn wrong(&self, line: usize, message: impl Into<String>, mend: impl Into<String>) -> Error {
-        Error::Ron { place: Place::at(&self.path, line, 0), message: message.into(), mend: mend.into() }
+        Error::Simulation {
+            place: Place::at(&self.path, line, 0),
+            message: message.into(),
+            mend: mend.into(),
+        }
     }
 }
 
@@ -215,13 +221,7 @@ impl<R: BufRead> Reader<'_, R> {
             );
         }
         // A block without numbers takes a frame back.
-        let numbers = block.words().iter().any(|w| !matches!(w.address.as_str(), "G" | "N" | "M"))
-            || block.tokens().iter().any(|t| {
-                block.text(&t.span).contains('(')
-                    && !matches!(t.kind, crate::nc::Kind::Comment)
-                    && block.text(&t.span).contains(|c: char| c.is_ascii_digit())
-            });
-        if step.changes_frame && numbers {
+        if step.changes_frame && has_numbers(block) {
             return told(
                 "the frame of the coordinates changes here",
                 "write the program in one frame; shifts and rotations are not followed",
@@ -385,6 +385,17 @@ impl<R: BufRead> Reader<'_, R> {
         }
         Ok(arc)
     }
+}
+
+/// Whether a block has numbers besides its codes: in words, or as arguments of a call.
+fn has_numbers(block: &Block) -> bool {
+    let codes = |address: &str| matches!(address, "G" | "N" | "M");
+    let arguments = |token: &Token| {
+        let text = block.text(&token.span);
+        let behind = text.split_once('(').map_or("", |(_, arguments)| arguments);
+        token.kind == Kind::Call && behind.contains(|c: char| c.is_ascii_digit())
+    };
+    block.words().iter().any(|w| !codes(&w.address)) || block.tokens().iter().any(arguments)
 }
 
 /// Whether the machine has not moved where a coordinate's number was lost for this reason.

@@ -206,6 +206,11 @@ impl Turning {
         &self.start
     }
 
+    /// The balls.
+    pub fn balls(&self) -> &Balls {
+        &self.balls
+    }
+
     fn starts(&mut self, first: f64) -> Result<Vec<Vec<f64>>> {
         if !matches!(self.figure, Figure::Circle { .. }) && self.linear.is_empty() {
             return Err(motion(
@@ -256,6 +261,9 @@ impl Turning {
                 });
                 if far.into_iter().all(|left| left < CLOSED) {
                     return Ok(vec![self.start.clone()]);
+                }
+                if self.rotary.is_empty() {
+                    self.go(first, first + std::f64::consts::FRAC_PI_2, &mut start)?;
                 }
                 self.by_all = true;
                 if self.balls.tool_point_t.0[..2] != [0.0, 0.0] {

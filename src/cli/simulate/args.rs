@@ -147,9 +147,9 @@ path         commands from a table (--input COMMANDS.csv)"
     #[arg(long, value_parser = amounts::positive_angle, conflicts_with_all = ["feed", "acceleration", "jerk", "overshoot"],
         value_name = "ANGLE", help_heading = "Motion")]
     pub step: Option<f64>,
-    /// Samples a second
-    #[arg(long, default_value = "100", value_parser = amounts::positive, value_name = "HZ", help_heading = "Motion")]
-    pub rate: f64,
+    /// Samples a second [default: 100; poses: 1]
+    #[arg(long, value_parser = amounts::positive, value_name = "HZ", help_heading = "Motion")]
+    pub rate: Option<f64>,
     /// Time between two recordings of this call
     #[arg(long, default_value = "60s", value_parser = amounts::time, value_name = "TIME", help_heading = "Motion")]
     pub pause: f64,

@@ -280,6 +280,11 @@ fn rotary_axis(args: &Args, machine: &Machine) -> Outcome<usize> {
     }
 }
 
+/// Samples a second.
+fn rate(args: &Args) -> f64 {
+    args.rate.unwrap_or(if args.test == Test::Poses { 1.0 } else { 100.0 })
+}
+
 /// The motion, and whether it has directions of approach.
 fn course(args: &Args, machine: &Machine, balls: Balls) -> Outcome<(Box<dyn Course>, bool)> {
     match args.test.sort() {
@@ -288,18 +293,18 @@ fn course(args: &Args, machine: &Machine, balls: Balls) -> Outcome<(Box<dyn Cour
             let figure = figure(args, machine, &held)?;
             let legs = turns(args, machine, &figure, &balls)?.legs();
             let rounding = Rounding { direction_decimals: args.bar_decimals, rotary_step: args.rotary_step };
-            Ok((Box::new(Turning::new(machine, figure, balls, &held, legs, args.rate, rounding)?), false))
+            Ok((Box::new(Turning::new(machine, figure, balls, &held, legs, rate(args), rounding)?), false))
         }
         Sort::Poses => {
             let (count, seed) = (args.count.unwrap_or(200), args.seed.wrapping_add(0x706f_7365));
-            Ok((Box::new(RandomPoses { machine: machine.clone(), count, seed, rate: args.rate }), true))
+            Ok((Box::new(RandomPoses { machine: machine.clone(), count, seed, rate: rate(args) }), true))
         }
         Sort::Program => {
             let held = held(args, machine)?;
             Ok((Box::new(PartProgram::new(input(args)?, machine, drive(args, &balls)?, held)), false))
         }
         Sort::Path => {
-            let table = CommandTable::open(input(args)?, machine, args.rate)?;
+            let table = CommandTable::open(input(args)?, machine, rate(args))?;
             let directions = table.has_directions();
             Ok((Box::new(table), directions))
         }
@@ -335,7 +340,7 @@ fn drive(args: &Args, balls: &Balls) -> Outcome<Drive> {
         acceleration: length("--acceleration", args.acceleration, 0.5)?,
         rotary_acceleration: 1000f64.to_radians(),
         corner: args.corner.unwrap_or(5f64.to_radians()),
-        rate: args.rate,
+        rate: rate(args),
     })
 }
 
