@@ -170,9 +170,9 @@ pub fn amount(text: &str, quantity: Quantity) -> Result<f64, String> {
 /// The number at the start of a text, and what follows it.
 pub(crate) fn cut_amount(text: &str) -> Option<(f64, &str)> {
     // The longest start that is a number, so that the `e` of `1e3mm` belongs to it.
-    let ends = text.char_indices().map(|(i, _)| i).chain([text.len()]).filter(|end| *end > 0);
+    let ends = text.char_indices().map(|(i, c)| i + c.len_utf8());
     let plain = |part: &str| part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b));
     let number = |end: usize| text.get(..end).filter(|part| plain(part))?.parse::<f64>().ok();
-    let (end, value) = ends.filter_map(|end| Some((end, number(end)?))).last()?;
+    let (end, value) = ends.rev().find_map(|end| Some((end, number(end)?)))?;
     Some((value, text[end..].trim()))
 }

@@ -224,7 +224,7 @@ impl CommandTable {
                 Use::Time(unit) => time = unit.to_si(value),
                 Use::Command(c, unit) => q[*c] = unit.to_si(value),
                 Use::Direction(c) => {
-                    let sign = if value > 0.0 { 1 } else { i8::from(value < 0.0) * -1 };
+                    let sign = if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
                     directions.iter_mut().for_each(|d| d[*c] = sign);
                 }
             }

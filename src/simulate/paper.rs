@@ -50,8 +50,7 @@ pub fn paper_plant(machine: &Machine, seed: u64) -> Plant {
     let mut random = |size: [f64; 6]| Twist::from_array(size.map(|s| s * normal(&mut rng)));
     let (um, urad) = (1e-6, 1e-6);
     let size = [50.0 * um, 50.0 * um, 50.0 * um, 100.0 * urad, 100.0 * urad, 100.0 * urad];
-    let mut faults = Faults::default();
-    faults.deviations = (0..machine.dyads().len()).map(|j| (j, random(size))).collect();
+    let deviations = (0..machine.dyads().len()).map(|j| (j, random(size))).collect();
     let dyad = |command: &usize| {
         let name = &machine.commands()[*command];
         machine.joints().find(|(_, joint)| joint.name == *name).map(|(j, joint)| (j, joint.twist()))
@@ -64,7 +63,8 @@ pub fn paper_plant(machine: &Machine, seed: u64) -> Plant {
         sin: Vec::new(),
         period: std::f64::consts::TAU,
     };
-    faults.backlash = rotary.iter().map(|(j, _)| *j).zip([by_angle, Width::Constant(40.0 * urad)]).collect();
+    let backlash = rotary.iter().map(|(j, _)| *j).zip([by_angle, Width::Constant(40.0 * urad)]).collect();
+    let faults = Faults { deviations, backlash, ..Faults::default() };
     let phases = random([std::f64::consts::PI; 6]).to_array();
     let mut plant = Plant::new(&CalibratedMachine::nominal(machine.clone())).with_faults(&faults);
     if let Some((j, xi)) = rotary.first().copied() {
