@@ -95,6 +95,12 @@ impl<'a> Session<'a> {
         Ok(Session { plant, runs, style, pause, seed, state, next: 0, later: 0.0 })
     }
 
+    /// The same with a clock that begins so many seconds later.
+    pub fn beginning_at(mut self, seconds: f64) -> Self {
+        self.later = seconds;
+        self
+    }
+
     /// Writes the next recording; `None` behind the last one. `each` is told of every sample.
     ///
     /// # Errors

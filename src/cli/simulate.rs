@@ -43,16 +43,8 @@ pub(crate) fn run(args: &Args) -> Outcome {
         drop_out: if args.drop_out_as == DropAs::Nan { "NaN" } else { "" },
     };
     let files = names(&args.output, runs.len());
-    for output in outputs.into_iter().flatten().chain(files.iter().map(PathBuf::as_path)) {
-        let same = |input: &&PathBuf| matches!((output.canonicalize(), input.canonicalize()), (Ok(a), Ok(b)) if a == b);
-        if let Some(input) = inputs.iter().find(same) {
-            return Err(usage(
-                format!("{}: would be overwritten, and it is an input", input.display()),
-                "give the output another name",
-            ));
-        }
-    }
-    let mut session = Session::new(&plant, &runs, &style, args.pause, args.seed)?;
+    check_apart(&outputs, &files, &inputs)?;
+    let mut session = Session::new(&plant, &runs, &style, args.pause, args.seed)?.beginning_at(args.begin);
     let mut all: Vec<Written> = Vec::new();
     for file in &files {
         let mut rows = 0u64;
@@ -83,6 +75,27 @@ pub(crate) fn run(args: &Args) -> Outcome {
     drop(progress);
     args.common.say(&summary(args, machine.machine(), &plant, &files, &all, &lengths));
     args.common.write_json(&result(args, machine.machine(), &plant, &files, &all, &lengths))
+}
+
+/// Refuses outputs that would overwrite an input or each other.
+fn check_apart(outputs: &[Option<&Path>], files: &[PathBuf], inputs: &[PathBuf]) -> Outcome {
+    // The first output stands for the recordings.
+    let all: Vec<&Path> =
+        outputs[1..].iter().flatten().copied().chain(files.iter().map(PathBuf::as_path)).collect();
+    for (i, output) in all.iter().enumerate() {
+        let same = |input: &&PathBuf| matches!((output.canonicalize(), input.canonicalize()), (Ok(a), Ok(b)) if a == b);
+        if let Some(input) = inputs.iter().find(same) {
+            let what = format!("{}: would be overwritten, and it is an input", input.display());
+            return Err(usage(what, "give the output another name"));
+        }
+        if all[..i].contains(output) {
+            return Err(usage(
+                format!("{}: two outputs have this name", output.display()),
+                "give each its own",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// `REC.csv`, or `REC_1.csv`, `REC_2.csv` ...

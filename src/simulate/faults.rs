@@ -89,7 +89,12 @@ impl Faults {
     }
 
     fn from_document(document: &Document, machine: &Machine) -> Result<Faults> {
-        let form: FaultsForm = document.read()?;
+        let form: FaultsForm = document.read().map_err(|error| match error {
+            Error::Ron { place, message, mend } if mend.starts_with("docs/") => {
+                Error::Ron { place, message, mend: "docs/simulate.md shows the form of a faults file".into() }
+            }
+            other => other,
+        })?;
         Reader { machine, form: &form }.faults().map_err(|Fail { path, message, mend }| Error::Simulation {
             place: document.place_of(&path),
             message,

@@ -150,6 +150,9 @@ path         commands from a table (--input COMMANDS.csv)"
     /// Samples a second [default: 100; poses: 1]
     #[arg(long, value_parser = amounts::positive, value_name = "HZ", help_heading = "Motion")]
     pub rate: Option<f64>,
+    /// Time of the first sample, for a recording that goes with others on one clock
+    #[arg(long, default_value = "0s", value_parser = amounts::time, value_name = "TIME", help_heading = "Motion")]
+    pub begin: f64,
     /// Time between two recordings of this call
     #[arg(long, default_value = "60s", value_parser = amounts::time, value_name = "TIME", help_heading = "Motion")]
     pub pause: f64,
