@@ -186,8 +186,14 @@ pub fn recording(
         let sample = Sample { time, q: q.clone(), directions: None, recorded: true, at: At::Pose(k + 1) };
         plant.advance(&mut state, &sample);
         let _ = write!(text, "{time:.3}");
-        for x in q.iter().chain(&instrument.read(nominal, &state, q, &mut rng).unwrap_or_default()) {
+        q.iter().for_each(|x| {
             let _ = write!(text, ",{x:.17}");
+        });
+        match instrument.read(nominal, &state, q, &mut rng) {
+            Some(values) => values.iter().for_each(|x| {
+                let _ = write!(text, ",{x:.17}");
+            }),
+            None => text.push_str(&",".repeat(instrument.sensor.reading_count())),
         }
         text.push('\n');
     }

@@ -10,7 +10,7 @@ use kincal::recording::Recording;
 use kincal::sensor::Sensor;
 use kincal::simulate::{
     At, Balls, Claims, Course, Family, Faults, Figure, Instrument, Leg, Pace, Plant, Pointing, RandomPoses,
-    Rounding, Run, Sample, Scatter, Sense, Standard, Style, Turning, Turns, noise_of, paper_path,
+    Rounding, Run, Sample, Scatter, Sense, Standard, Style, Turning, Turns, Wave, noise_of, paper_path,
     paper_plant, plane_across, recordings, rest, usual_range,
 };
 use kincal::{CalibratedMachine, Chain, Machine};
@@ -404,6 +404,33 @@ fn on_a_cone_the_bar_keeps_its_angle_in_the_workpiece_and_without_the_function_i
                 assert!(off.norm() < 1e-9, "{stem} {u}: {off:?}");
             }
         }
+    }
+}
+
+#[test]
+fn rotary_axes_that_move_as_told_keep_the_distance_too() {
+    let machine = common::machine("ac_table_tilting_paper");
+    let chain = Chain::nominal(&machine);
+    let wave = |command, offset: f64, turns, amplitude: f64, cycles| Wave {
+        command,
+        offset: offset.to_radians(),
+        turns,
+        amplitude: amplitude.to_radians(),
+        cycles,
+        phase: 0.0,
+    };
+    // A = 45 + 30 cos 2 phi, C = phi: a path that the paper did not train on.
+    let waves = vec![wave(0, 45.0, 0.0, 30.0, 2.0), wave(1, 0.0, 1.0, 0.0, 0.0)];
+    let (half_apex, inclination) = (PI / 4.0, PI / 6.0);
+    let figure = Figure::Waves { waves, half_apex, inclination, tool_centre_point: false };
+    for sample in
+        samples(&turning(&machine, figure, balls(0.1), once(0.0, TAU)).unwrap_or_else(|e| panic!("{e}")))
+    {
+        let At::Turn(u) = sample.at else { panic!("a turn") };
+        assert!(
+            (sample.q[0].to_degrees() - (45.0 + 30.0 * (2.0 * u).cos())).abs() < 1e-9 && sample.q[1] == u
+        );
+        assert!((chain.w_from_t(&sample.q).translation.norm() - 0.1).abs() < 1e-12);
     }
 }
 

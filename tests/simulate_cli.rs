@@ -8,8 +8,9 @@ use std::process::{Command, Output};
 use insta::assert_snapshot;
 use kincal::lie::Vec3;
 use kincal::recording::Recording;
-use kincal::simulate::{At, Course, Drive, Faults, PartProgram, Sample, rest};
+use kincal::simulate::{At, CommandTable, Course, Drive, Faults, PartProgram, Sample, rest};
 use kincal::{CalibratedMachine, Chain, Machine};
+use proptest::prelude::*;
 
 fn kincal(args: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
@@ -181,7 +182,6 @@ fn what_cannot_be_run_is_refused_with_the_reason() {
         vec![reference, "--test", "rotary", "--axis", "b"],
         vec![reference, "--test", "BK4", "--length", "900mm"],
         vec![reference, "--test", "BK4", "--inclination", "45deg"],
-        vec![reference, "--test", "BK4", "--radius", "1mm"],
         vec![reference, "--test", "BK4", "--plane", "x,y"],
         vec![reference, "--test", "BK1", "--feed", "1000mm/min"],
         vec![reference, "--test", "circle", "--plane", "x,c"],
@@ -198,8 +198,10 @@ fn what_cannot_be_run_is_refused_with_the_reason() {
         vec![mill, "--test", "path", "--input", &table],
         vec![mill, "--test", "path", "--input", &wrong],
         vec![mill, "--test", "path", "--input", "no/such/table.csv"],
+        vec![mill, "--test", "circle", "--nc", &out],
+        vec![mill, "--test", "path", "--input", &table, "--truth", &table],
     ];
-    let told = all.into_iter().filter(|args| !args.contains(&"--radius")).map(|mut args| {
+    let told = all.into_iter().map(|mut args| {
         args.extend(["-o", &out]);
         let shown = args[..args.len() - 2].join(" ").replace(&format!("{}/", folder.0.display()), "");
         format!("$ {shown}\n{}", refused(&folder, &args))
@@ -448,4 +450,94 @@ fn the_faults_file_of_the_document_reads() {
     );
     let z = faults.backlash[3].1.at(0.1);
     assert!((z - 3e-6).abs() < 1e-15, "2 um and 0.01 um for each of 100 mm");
+}
+
+/// Pieces of programs, tables and faults, put together at random.
+fn pieces() -> impl Strategy<Value = String> {
+    let words = [
+        "G0",
+        "G1",
+        "G2",
+        "G3",
+        "G4",
+        "G17",
+        "G19",
+        "G20",
+        "G90",
+        "G91",
+        "G93",
+        "G43.4",
+        "G49",
+        "X",
+        "Y1",
+        "Z-2.5",
+        "X1e300",
+        "I1",
+        "J0",
+        "K3",
+        "R-2",
+        "R0",
+        "F0",
+        "F1e9",
+        "P1",
+        "A90",
+        "C-30",
+        "=",
+        "(",
+        ")",
+        ";",
+        " ",
+        "\n",
+        "#1",
+        "TRAORI",
+        "M6",
+        "L ",
+        "x[mm]",
+        "y[mm]",
+        "z[mm]",
+        "t[s]",
+        ",",
+        "1",
+        "-1e400",
+        "nan",
+        "# fixed z[mm]: 0\n",
+        "x_direction[1]",
+        "Faults(",
+        "units: (length: um, angle: urad)",
+        "backlash: [",
+        "(joint: \"x\", ",
+        "width: 1",
+        "]",
+        "by_position: Points([(0, 1)])",
+        "Harmonics(mean: 1, period: 0)",
+        "Polynomial([1])",
+    ];
+    proptest::collection::vec(proptest::sample::select(words.to_vec()), 0..40)
+        .prop_map(|words| words.concat())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 512,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(20_260_103),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn any_input_is_run_or_refused(text in pieces()) {
+        let folder = Folder::new("any");
+        let path = folder.write("any", &text);
+        for machine in [common::machine("xyz_mill"), common::machine("ac_table_tilting")] {
+            let _ = Faults::parse("any.ron", &text, &machine);
+            let program = PartProgram::new(&path, &machine, drive(), rest(&machine));
+            let table = CommandTable::open(&path, &machine, 10.0).ok();
+            let courses = table.iter().map(|t| t as &dyn Course).chain([&program as &dyn Course]);
+            for samples in courses.filter_map(|course| course.samples().ok()) {
+                for sample in samples.take(2000).map_while(Result::ok) {
+                    prop_assert!(sample.time.is_finite() && sample.q.iter().all(|x| x.is_finite()), "{text}");
+                }
+            }
+        }
+    }
 }

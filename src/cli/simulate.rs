@@ -170,6 +170,9 @@ fn summary(
     } else {
         text.push_str("no constant deviations\n");
     }
+    if plant.varies() {
+        text.push_str("joints with play\n");
+    }
     if args.truth.is_some() && plant.varies() {
         text.push_str("the file of the truth holds the constant deviations only, not what varies with position or direction\n");
     }

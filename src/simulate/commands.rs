@@ -187,6 +187,19 @@ impl CommandTable {
             } else {
                 continue;
             };
+            let same = |(_, other): &(usize, Use)| match (other, &purpose) {
+                (Use::Command(a, _), Use::Command(b, _)) | (Use::Direction(a), Use::Direction(b)) => a == b,
+                (Use::Time(_), Use::Time(_)) => true,
+                _ => false,
+            };
+            if self.columns.iter().any(same) {
+                return Err(self.wrong(
+                    line,
+                    i + 1,
+                    format!("column `{name}` stands twice"),
+                    "keep one of them",
+                ));
+            }
             self.columns.push((i, purpose));
         }
         Ok(())

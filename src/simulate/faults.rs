@@ -63,7 +63,9 @@ impl Width {
             }
             Width::Points(points) => {
                 let after = points.partition_point(|(position, _)| *position <= q);
-                let Some((from, low)) = after.checked_sub(1).map(|i| points[i]) else { return points[0].1 };
+                let Some((from, low)) = after.checked_sub(1).map(|i| points[i]) else {
+                    return points.first().map_or(0.0, |(_, width)| *width);
+                };
                 let Some((to, high)) = points.get(after) else { return low };
                 low + (high - low) * (q - from) / (to - from)
             }

@@ -22,10 +22,14 @@ use crate::machine::{JointKind, Machine};
 /// # Errors
 /// [`Error::Motion`](crate::Error::Motion) where the machine has not two rotary axes, or does not reach the path.
 pub fn paper_path(machine: &Machine, length: f64, step: f64) -> Result<Turning> {
-    let Figure::Cone { half_apex, inclination, lead, .. } = Figure::cone() else {
-        unreachable!("a cone is one")
+    use std::f64::consts::{FRAC_PI_4, FRAC_PI_6};
+    let figure = Figure::Cone {
+        half_apex: FRAC_PI_4,
+        inclination: FRAC_PI_6,
+        lead: 0.0,
+        tool_centre_point: false,
+        reversed: true,
     };
-    let figure = Figure::Cone { half_apex, inclination, lead, tool_centre_point: false, reversed: true };
     let origin = Vec3([0.0; 3]);
     let balls = Balls { workpiece_point_w: origin, tool_point_t: origin, length };
     let turns = Turns {

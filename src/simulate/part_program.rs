@@ -18,6 +18,8 @@ use crate::nc::{
 
 /// Blocks that the speed is planned ahead for; the path can stop behind them.
 const AHEAD: usize = 256;
+/// Coordinates beyond this are mistakes, m or rad.
+const FURTHEST: f64 = 1e4;
 
 /// How a program is run.
 #[derive(Clone, Debug, PartialEq)]
@@ -269,7 +271,14 @@ impl<R: BufRead> Reader<'_, R> {
         for (c, value) in end.iter_mut().enumerate() {
             let named = motion.words[c].is_some();
             match (motion.target[c], self.state.coordinates()[c]) {
-                (Some(target), _) => *value = target * self.unit(c),
+                (Some(target), _) if (target * self.unit(c)).abs() <= FURTHEST => {
+                    *value = target * self.unit(c)
+                }
+                (Some(target), _) => {
+                    let address = &self.state.addresses()[c];
+                    let what = format!("{address} goes to {target}, which no machine reaches");
+                    return Err(source.wrong(motion.line, what, "correct the number"));
+                }
                 // What the control does not know by number has not moved since; what it cannot know here has.
                 (None, Coordinate::Lost { line, why, .. }) if named || !stands(why) => {
                     let address = &self.state.addresses()[c];
