@@ -10,6 +10,7 @@ mod diagnose;
 mod location;
 mod output;
 mod predict;
+mod simulate;
 
 use std::process::ExitCode;
 
@@ -39,6 +40,8 @@ enum Command {
     Diagnose(diagnose::Args),
     /// The NC program with corrected axis words, everything else as it was
     Compensate(compensate::Args),
+    /// Recordings of a machine whose errors are known: standard tests, random poses, NC programs
+    Simulate(Box<simulate::Args>),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
     Demo(demo::Args),
 }
@@ -64,6 +67,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Predict(args) => predict::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Compensate(args) => compensate::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),
     };
     match outcome {

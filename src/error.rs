@@ -118,6 +118,24 @@ pub enum Error {
         /// What would help.
         mend: String,
     },
+    /// Faults, an NC program or a table of commands that a simulation cannot use.
+    #[error("{place}: {message}")]
+    Simulation {
+        /// Where in the file.
+        place: Place,
+        /// What is wrong.
+        message: String,
+        /// How to mend it.
+        mend: String,
+    },
+    /// A motion that the machine cannot make.
+    #[error("{what}")]
+    Motion {
+        /// Which, and where it fails.
+        what: String,
+        /// What would help.
+        mend: String,
+    },
 }
 
 impl Error {
@@ -129,7 +147,10 @@ impl Error {
             Error::Nc { fault, .. } => fault.mend(),
             Error::Effects { fault, .. } => fault.mend.clone(),
             Error::Compensate { fault, .. } => fault.mend(),
-            Error::Ron { mend, .. } | Error::Undetermined { mend, .. } => mend.clone(),
+            Error::Ron { mend, .. }
+            | Error::Simulation { mend, .. }
+            | Error::Undetermined { mend, .. }
+            | Error::Motion { mend, .. } => mend.clone(),
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
             }
@@ -145,8 +166,9 @@ impl Error {
             | Error::Nc { place, .. }
             | Error::Effects { place, .. }
             | Error::Compensate { place, .. }
-            | Error::Ron { place, .. } => Some(place),
-            Error::File { .. } | Error::Undetermined { .. } => None,
+            | Error::Ron { place, .. }
+            | Error::Simulation { place, .. } => Some(place),
+            Error::File { .. } | Error::Undetermined { .. } | Error::Motion { .. } => None,
         }
     }
 

@@ -36,7 +36,7 @@
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
 //! | [`inverse`] | commands that bring the tool to a pose, for any chain |
 //! | [`mod@compensate`] | NC programs rewritten so that the actual machine cuts what they mean |
-//! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known |
+//! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known: faults, tests, instruments |
 //!
 //! # A complete example
 //!

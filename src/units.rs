@@ -130,26 +130,49 @@ impl Unit {
     }
 }
 
-/// A number with its unit behind it, such as `0.01deg` or `100 mm`, in SI; `None` if it is not one of this quantity.
-///
-/// ```
-/// use kincal::units::{Quantity, measure};
-/// assert_eq!(measure("100 mm", Quantity::Length), Some(0.1));
-/// assert_eq!(measure("100mm", Quantity::Angle), None);
-/// ```
-pub fn measure(text: &str, quantity: Quantity) -> Option<f64> {
-    let text = text.trim();
-    let of_quantity = |u: &&Unit| u.quantity == quantity && text.ends_with(u.symbol);
-    // `mm` ends with `m`: the longest symbol that leaves a number counts.
-    let mut numbers = UNITS.iter().filter(of_quantity).filter_map(|u| {
-        let number: f64 = text[..text.len() - u.symbol.len()].trim().parse().ok()?;
-        number.is_finite().then(|| u.to_si(number))
-    });
-    numbers.next_back()
-}
-
 impl fmt::Display for Unit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.symbol)
     }
+}
+
+/// A number with its unit, as command lines and faults files write it: `100mm`, `-0.5 um`, `60urad`; in SI.
+///
+/// ```
+/// use kincal::units::{Quantity, amount};
+/// assert_eq!(amount("100mm", Quantity::Length), Ok(0.1));
+/// assert_eq!(amount("100", Quantity::Length).unwrap_err(), "`100` has no unit; write one of: m mm um nm in");
+/// ```
+///
+/// # Errors
+/// What is wrong, with the units that fit.
+pub fn amount(text: &str, quantity: Quantity) -> Result<f64, String> {
+    let text = text.trim();
+    let fits = || format!("write one of: {}", Unit::symbols_of(quantity));
+    let (number, symbol) = cut_amount(text).ok_or_else(|| format!("`{text}` is no number with a unit"))?;
+    if symbol.is_empty() {
+        return Err(format!("`{text}` has no unit; {}", fits()));
+    }
+    let Some(unit) = Unit::named(symbol) else {
+        return Err(format!("unit `{symbol}` is not known; {}", fits()));
+    };
+    if unit.quantity != quantity {
+        return Err(format!("`{symbol}` is a unit of {}; {}", unit.quantity, fits()));
+    }
+    let value = unit.to_si(number);
+    if value.is_finite() && value.abs() <= 1e9 {
+        Ok(value)
+    } else {
+        Err(format!("`{text}` is not a usable number"))
+    }
+}
+
+/// The number at the start of a text, and what follows it.
+pub(crate) fn cut_amount(text: &str) -> Option<(f64, &str)> {
+    // The longest start that is a number, so that the `e` of `1e3mm` belongs to it.
+    let ends = text.char_indices().map(|(i, c)| i + c.len_utf8());
+    let plain = |part: &str| part.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b));
+    let number = |end: usize| text.get(..end).filter(|part| plain(part))?.parse::<f64>().ok();
+    let (end, value) = ends.rev().find_map(|end| Some((end, number(end)?)))?;
+    Some((value, text[end..].trim()))
 }

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use kincal::identify::{Figures, Fit, Loss, Model, Options, Rms, Solver, calibrate_model};
 use kincal::machine::JointKind;
 use kincal::recording::Recording;
-use kincal::units::{Quantity, Unit, measure};
+use kincal::units::{Quantity, Unit, amount};
 use kincal::variation::{Directions, MOST_AXES, Varying};
 use kincal::{CalibratedMachine, Machine};
 
@@ -115,7 +115,7 @@ impl Args {
                 JointKind::Prismatic => Quantity::Length,
                 JointKind::Revolute => Quantity::Angle,
             };
-            let Some(band) = measure(size, quantity).filter(|band| *band >= 0.0) else {
+            let Some(band) = amount(size, quantity).ok().filter(|band| *band >= 0.0) else {
                 let what = format!("--dead-band {text} is not an axis with a size");
                 let units = Unit::symbols_of(quantity);
                 let own = match quantity {

@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::form::{AxisForm, DyadForm, JointBody, JointForm, MachineForm, MoveForm, ToleranceForm, Triple};
+use super::form::{
+    AxisForm, DyadForm, JointBody, JointForm, MachineForm, MoveForm, ToleranceForm, Triple, UnitsForm,
+};
 use super::{
     Branch, Drive, Dyad, FileUnits, Joint, JointKind, Machine, MachineFault, MassPoint, NcWord, Placement,
     Tolerance,
@@ -41,10 +43,7 @@ impl Machine {
     }
 
     pub(crate) fn from_form(form: &MachineForm) -> Checked<Machine> {
-        let units = FileUnits {
-            length: Unit::named(&unit_word(&form.units.length)).expect("every length word is a unit"),
-            angle: Unit::named(&unit_word(&form.units.angle)).expect("every angle word is a unit"),
-        };
+        let units = form.units.units();
         let branch = |branch: Branch, forms: &[DyadForm]| -> Checked<Vec<Dyad>> {
             let path = |i| format!("{}[{i}]", branch.field());
             forms.iter().enumerate().map(|(i, f)| dyad(f, units, &path(i))).collect()
@@ -184,6 +183,16 @@ impl Machine {
 /// A fault with its path becomes an error with its place.
 pub(crate) fn at_path(document: &Document, (path, fault): (String, MachineFault)) -> Error {
     Error::Machine { place: document.place_of(&path), fault }
+}
+
+impl UnitsForm {
+    /// The units that the words name.
+    pub(crate) fn units(&self) -> FileUnits {
+        FileUnits {
+            length: Unit::named(&unit_word(&self.length)).expect("every length word is a unit"),
+            angle: Unit::named(&unit_word(&self.angle)).expect("every angle word is a unit"),
+        }
+    }
 }
 
 fn unit_word(word: &impl serde::Serialize) -> String {

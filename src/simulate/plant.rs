@@ -1,0 +1,261 @@
+//! The simulated machine: everything that is wrong with it, and the deviations that hold at a sample.
+
+use std::fmt;
+use std::sync::Arc;
+
+use super::course::Sample;
+use super::faults::{Faults, Width};
+use super::random_deviations;
+use crate::calibration::CalibratedMachine;
+use crate::chain::Chain;
+use crate::error::Result;
+use crate::lie::{Pose, Twist};
+use crate::machine::Machine;
+use crate::motion::Play;
+
+/// Movements below this do not count as the first motion of a joint, m or rad: rounding of solved axes.
+const FIRST_MOTION: f64 = 1e-9;
+
+/// A deviation that depends on where the machine stands: displacements of all dyads' joints (m or rad, machine order).
+type Varying = Arc<dyn Fn(&[f64]) -> Twist<f64> + Send + Sync>;
+
+/// A machine with everything that is wrong with it.
+///
+/// Constant deviations of initial poses, joint twists and displacements come down to one twist `dh` per dyad; play and what
+/// else depends on position is added to it sample by sample, in [`Plant::advance`] and nowhere else.
+#[derive(Clone)]
+pub struct Plant {
+    machine: Machine,
+    /// Constant deviations, one per dyad.
+    constant: Vec<Twist<f64>>,
+    backlash: Vec<(usize, Width)>,
+    varying: Vec<(usize, Varying)>,
+    /// Frame `w` of the instrument in the machine's frame `w`.
+    w_from_instrument: Option<Pose<f64>>,
+}
+
+impl fmt::Debug for Plant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Plant")
+            .field("machine", &self.machine.name())
+            .field("constant", &self.constant)
+            .field("backlash", &self.backlash)
+            .field("varying", &self.varying.iter().map(|(j, _)| j).collect::<Vec<_>>())
+            .finish()
+    }
+}
+
+/// Where a plant stands: the chain at the last sample, and the history that play remembers.
+#[derive(Clone, Debug)]
+pub struct State {
+    chain: Chain<f64>,
+    deviations: Vec<Twist<f64>>,
+    displacements: Vec<f64>,
+    /// One per entry of the plant's backlash.
+    plays: Vec<Option<Play>>,
+    first: Vec<i8>,
+}
+
+impl State {
+    /// The chain that holds at the last sample.
+    pub fn chain(&self) -> &Chain<f64> {
+        &self.chain
+    }
+
+    /// Deviations of all dyads at the last sample, m and rad.
+    pub fn deviations(&self) -> &[Twist<f64>] {
+        &self.deviations
+    }
+
+    /// Commanded displacements of all dyads' joints at the last sample, m or rad.
+    pub fn displacements(&self) -> &[f64] {
+        &self.displacements
+    }
+}
+
+impl Plant {
+    /// A machine file as it is, with its constant deviations if it is calibrated.
+    pub fn new(machine: &CalibratedMachine) -> Self {
+        Plant {
+            machine: machine.machine().clone(),
+            constant: machine.deviations().to_vec(),
+            backlash: Vec::new(),
+            varying: Vec::new(),
+            w_from_instrument: None,
+        }
+    }
+
+    /// Deviations of every dyad drawn from the machine's tolerances times `size`, added to those that are there.
+    pub fn with_random(mut self, size: f64, seed: u64) -> Self {
+        let random = random_deviations(&self.machine, size, seed);
+        self.constant.iter_mut().zip(random).for_each(|(dh, more)| *dh = *dh + more);
+        self
+    }
+
+    /// Adds faults: deviations add up, then factors, displacements and twists change the initial poses exactly,
+    ///
+    /// ```text
+    /// M_j exp(dh_j) exp(d_j) exp(xi_j (q_j + offset_j)) exp(-d_j)          d_j: displaced axis
+    /// ```
+    ///
+    /// and what stands behind the joint goes into the next dyad.
+    pub fn with_faults(mut self, faults: &Faults) -> Self {
+        for (j, dh) in &faults.deviations {
+            self.constant[*j] = self.constant[*j] + *dh;
+        }
+        let dyads = self.machine.dyads();
+        let mut actual: Vec<Pose<f64>> = dyads
+            .iter()
+            .zip(&self.constant)
+            .map(|(dyad, dh)| dyad.placement.pose() * Pose::exp(*dh))
+            .collect();
+        for (j, d) in &faults.factors {
+            // The factor of the workpiece branch is the inverse of the pose.
+            actual[*j] = match *j < self.machine.workpiece_count() {
+                true => Pose::exp(-*d) * actual[*j],
+                false => actual[*j] * Pose::exp(*d),
+            };
+        }
+        for (j, d) in &faults.twists {
+            // A joint is never the last dyad of its branch.
+            actual[*j] = actual[*j] * Pose::exp(*d);
+            actual[*j + 1] = Pose::exp(-*d) * actual[*j + 1];
+        }
+        for (j, offset) in &faults.displacements {
+            if let Some(joint) = &dyads[*j].joint {
+                actual[*j] = actual[*j] * Pose::exp(joint.twist().times(*offset));
+            }
+        }
+        let touched =
+            !(faults.factors.is_empty() && faults.displacements.is_empty() && faults.twists.is_empty());
+        if touched {
+            for (j, dh) in self.constant.iter_mut().enumerate() {
+                *dh = (dyads[j].placement.pose().inverse() * actual[j]).log();
+            }
+        }
+        self.backlash.extend(faults.backlash.iter().cloned());
+        self
+    }
+
+    /// Adds a deviation of dyad `j` that depends on the displacements of all dyads' joints (m or rad, machine order).
+    pub fn with_varying(
+        mut self,
+        j: usize,
+        deviation: impl Fn(&[f64]) -> Twist<f64> + Send + Sync + 'static,
+    ) -> Self {
+        self.varying.push((j, Arc::new(deviation)));
+        self
+    }
+
+    /// Stands the instrument's frame `w` elsewhere: its pose in the frame `w` of the machine.
+    pub fn with_instrument_frame(mut self, w_from_instrument: Pose<f64>) -> Self {
+        self.w_from_instrument = Some(w_from_instrument);
+        self
+    }
+
+    /// The machine as declared.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Constant deviations of all dyads, m and rad.
+    pub fn constant(&self) -> &[Twist<f64>] {
+        &self.constant
+    }
+
+    /// Whether there is more than constant deviations.
+    pub fn varies(&self) -> bool {
+        !(self.backlash.is_empty() && self.varying.is_empty())
+    }
+
+    /// Direction of the first motion of every joint with play over the samples, in the order of the backlash.
+    ///
+    /// # Errors
+    /// The first one of the samples.
+    pub fn first_directions(&self, samples: impl Iterator<Item = Result<Sample>>) -> Result<Vec<i8>> {
+        let mut first = vec![0i8; self.backlash.len()];
+        let mut start: Option<Vec<f64>> = None;
+        if first.is_empty() {
+            return Ok(first);
+        }
+        for sample in samples {
+            let sample = sample?;
+            let s = self.machine.displacements(&sample.q);
+            let start = start.get_or_insert_with(|| s.clone());
+            for (first, (j, _)) in first.iter_mut().zip(&self.backlash).filter(|(first, _)| **first == 0) {
+                let stated = self.stated(&sample, *j);
+                let gone = s[*j] - start[*j];
+                if stated != 0 {
+                    *first = stated;
+                } else if gone.abs() > FIRST_MOTION {
+                    *first = if gone > 0.0 { 1 } else { -1 };
+                }
+            }
+            if !first.contains(&0) {
+                break;
+            }
+        }
+        Ok(first)
+    }
+
+    /// Nothing has moved yet. `first`: from [`Plant::first_directions`].
+    pub fn start(&self, first: Vec<i8>) -> State {
+        let mut chain = Chain::new(&self.machine, &self.constant);
+        if let Some(shift) = self.w_from_instrument {
+            let w = self.machine.w_index();
+            chain.set_previous_from_frame(w, chain.previous_from_frame(w) * shift);
+        }
+        State {
+            chain,
+            deviations: self.constant.clone(),
+            displacements: vec![0.0; self.constant.len()],
+            plays: vec![None; self.backlash.len()],
+            first,
+        }
+    }
+
+    /// Direction of approach that a sample states for the joint of dyad `j`; 0 where it says nothing.
+    fn stated(&self, sample: &Sample, j: usize) -> i8 {
+        let (Some(directions), Some(drive)) = (&sample.directions, self.machine.drive(j)) else { return 0 };
+        let sum: f64 = drive.terms.iter().map(|(c, factor)| factor * f64::from(directions[*c])).sum();
+        if sum == 0.0 { 0 } else { sum.signum() as i8 }
+    }
+
+    /// The machine at the next sample: the deviations and the chain that hold there.
+    pub fn advance(&self, state: &mut State, sample: &Sample) {
+        state.displacements = self.machine.displacements(&sample.q);
+        let s = &state.displacements;
+        let mut touched = vec![false; self.constant.len()];
+        let mut touch = |deviations: &mut [Twist<f64>], j: usize, more: Twist<f64>| {
+            if !std::mem::replace(&mut touched[j], true) {
+                deviations[j] = self.constant[j];
+            }
+            deviations[j] = deviations[j] + more;
+        };
+        for (i, (j, width)) in self.backlash.iter().enumerate() {
+            let (q, width) = (s[*j], width.at(s[*j]));
+            let stated = self.stated(sample, *j);
+            let play = match &mut state.plays[i] {
+                // A settled position: the drive came from that side, and further than the play is wide.
+                play if stated != 0 => play.insert(Play::new(q, width.max(0.0), stated)),
+                play => play.get_or_insert_with(|| {
+                    Play::new(q, width.max(0.0), state.first.get(i).copied().unwrap_or(0))
+                }),
+            };
+            let error = play.advance(q, width);
+            if let Some(joint) = &self.machine.dyads()[*j].joint {
+                touch(&mut state.deviations, *j, joint.twist().times(error));
+            }
+        }
+        for (j, deviation) in &self.varying {
+            touch(&mut state.deviations, *j, deviation(s));
+        }
+        for j in (0..touched.len()).filter(|j| touched[*j]) {
+            let mut pose = self.machine.dyads()[j].placement.pose() * Pose::exp(state.deviations[j]);
+            if let Some(shift) = self.w_from_instrument.filter(|_| j == self.machine.w_index()) {
+                pose = pose * shift;
+            }
+            state.chain.set_previous_from_frame(j, pose);
+        }
+    }
+}
