@@ -89,9 +89,9 @@ impl Model {
         let mut covariance = vec![vec![0.0; all + parameters]; all + parameters];
         let own = |c: usize| self.offsets[i] + c;
         if slopes.is_empty() {
-            for a in 0..k {
-                for b in 0..k {
-                    covariance[a][b] = scale(a) * scale(b) * self.covariance[(own(a), own(b))];
+            for (a, row) in covariance.iter_mut().enumerate().take(k) {
+                for (b, x) in row.iter_mut().enumerate().take(k) {
+                    *x = scale(a) * scale(b) * self.covariance[(own(a), own(b))];
                 }
             }
             return Solved { coefficients, covariance };

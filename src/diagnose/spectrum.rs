@@ -29,7 +29,7 @@ impl Spectrum {
             return None;
         }
         let cells = (4.0 * extent * largest / TAU).ceil() + 2.0;
-        if !(cells * 8.0 < LONGEST as f64) {
+        if cells.is_nan() || cells * 8.0 >= LONGEST as f64 {
             return None;
         }
         let cell = extent / (cells - 2.0);

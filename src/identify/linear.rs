@@ -143,7 +143,7 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[
             let mut kept = Vec::new();
             for k in 0..chunk.len {
                 number += 1;
-                if (number - 1) % stride != 0 {
+                if !(number - 1).is_multiple_of(stride) {
                     continue;
                 }
                 kept.push(k);
