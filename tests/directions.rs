@@ -187,11 +187,17 @@ fn degrees(a: f64) -> f64 {
     a.to_radians()
 }
 
-#[test]
-fn on_paths_not_trained_on_pieces_predict_as_well_as_one_model_and_nearly_as_well_as_can_be() {
-    let machine = common::machine("ac_table_tilting_paper");
-    let run = |length, bar, angles| path(&machine, length, bar, angles, 180);
-    let trained = [run(0.1, Bar::Machine, None), run(0.1, Bar::Table, None), run(0.15, Bar::Machine, None)];
+/// Over five unseen paths together: pieces against unified (median, worst of all tables), and the mean errors of pieces, unified and
+/// unified without room for error motions over that of the best estimator.
+struct Elsewhere {
+    median: f64,
+    worst: f64,
+    to_best: [f64; 3],
+}
+
+/// Trains on three paths and judges on five others, `SEEDS` tables from `first_seed` on.
+fn elsewhere(machine: &Machine, trained: &[Vec<Vec<f64>>; 3], first_seed: u64) -> Elsewhere {
+    let run = |length, bar, angles| path(machine, length, bar, angles, 180);
     let unseen = [
         run(0.1, Bar::Machine, Some(|phi| (degrees(45.0 + 30.0 * (2.0 * phi).cos()), phi))),
         run(0.1, Bar::Table, Some(|phi| (degrees(45.0 + 30.0 * (2.0 * phi).cos()), phi))),
@@ -203,43 +209,91 @@ fn on_paths_not_trained_on_pieces_predict_as_well_as_one_model_and_nearly_as_wel
             Some(|phi| (degrees(45.0 - 30.0 * phi.cos()), 0.5 * (2.0 * phi).sin() - phi)),
         ),
     ];
-    let best = Best::new(&machine, &trained.each_ref().map(|p| &p[..]));
-    let expected = unseen.each_ref().map(|path| best.expected_error(&machine, path) * 1e6);
-    // By path: pieces, unified, the best estimator, unified without room for error motions, um.
+    let best = Best::new(machine, &trained.each_ref().map(|p| &p[..]));
+    let expected = unseen.each_ref().map(|path| best.expected_error(machine, path) * 1e6);
+    // By path: pieces, unified, unified without room for error motions, the best estimator, um.
     let one = |seed: u64| -> [[f64; 4]; 5] {
-        let table = Table::random(&machine, seed);
+        let table = Table::random(machine, seed);
         let recordings: Vec<Recording> = (trained.iter().enumerate())
-            .map(|(i, p)| record(&machine, &table, p, &format!("{i}.csv"), 100 + 10 * seed + i as u64))
+            .map(|(i, p)| record(machine, &table, p, &format!("{i}.csv"), 100 + 10 * seed + i as u64))
             .collect();
         let values = |r: &Recording| -> Vec<f64> {
             r.chunks().expect("opens").flat_map(|chunk| chunk.expect("reads").values).collect()
         };
-        let guess = best.table(&machine, &recordings.iter().flat_map(values).collect::<Vec<_>>());
+        let guess = best.table(machine, &recordings.iter().flat_map(values).collect::<Vec<_>>());
         let asked = [(Kind::AcFr, ERROR_MOTIONS), (Kind::Unified, ERROR_MOTIONS), (Kind::Unified, 0.0)];
-        let models = asked.map(|(kind, room)| identify(&machine, kind, &recordings, None, room));
+        let models = asked.map(|(kind, room)| identify(machine, kind, &recordings, None, room));
         unseen.each_ref().map(|path| {
-            let truth = table.lengths(&machine, path);
+            let truth = table.lengths(machine, path);
             let [pieces, unified, bent] =
                 models.each_ref().map(|m| mean_size(&truth, &predicted(m, path)) * 1e6);
-            [pieces, unified, mean_size(&truth, &guess.lengths(&machine, path)) * 1e6, bent]
+            [pieces, unified, bent, mean_size(&truth, &guess.lengths(machine, path)) * 1e6]
         })
     };
-    let all: Vec<[[f64; 4]; 5]> = (0..SEEDS).into_par_iter().map(one).collect();
-    let mean = |k: usize, path: usize| all.iter().map(|of| of[path][k]).sum::<f64>() / SEEDS as f64;
+    let all: Vec<[[f64; 4]; 5]> = (first_seed..first_seed + SEEDS).into_par_iter().map(one).collect();
     for (path, expected) in expected.iter().enumerate() {
-        let [pieces, unified, best] = [0, 1, 2].map(|k| mean(k, path));
+        let mean = |k: usize| all.iter().map(|of| of[path][k]).sum::<f64>() / SEEDS as f64;
+        let [pieces, unified, best] = [0, 1, 3].map(mean);
         println!(
             "path {path}: pieces {pieces:.2}, unified {unified:.2}, best {best:.2} (expected {expected:.2}) um"
         );
     }
-    // Over the five paths together, seed by seed.
     let sum = |of: &[[f64; 4]; 5], k: usize| of.iter().map(|path| path[k]).sum::<f64>();
+    let over_all = |k: usize| all.iter().map(|of| sum(of, k)).sum::<f64>();
     let ratios: Vec<f64> = all.iter().map(|of| sum(of, 0) / sum(of, 1)).collect();
     let worst = ratios.iter().copied().fold(0.0, f64::max);
-    let all_of = |k: usize| all.iter().map(|of| sum(of, k)).sum::<f64>();
-    let [to_best, unified_to_best, bent] = [0, 1, 3].map(|k| all_of(k) / all_of(2));
-    println!("pieces against unified: median {:.4}, worst {worst:.3}", median(ratios.clone()));
-    println!("against the best: pieces {to_best:.3}, unified {unified_to_best:.3}, without room {bent:.3}");
-    assert!(median(ratios) <= 1.0 && worst <= 1.1);
-    assert!(to_best <= 1.15 && unified_to_best <= 1.15 && bent > 1.3);
+    let to_best = [0, 1, 2].map(|k| over_all(k) / over_all(3));
+    let told = Elsewhere { median: median(ratios), worst, to_best };
+    println!("pieces against unified: median {:.4}, worst {:.3}", told.median, told.worst);
+    let [pieces, unified, bent] = to_best;
+    println!("against the best: pieces {pieces:.3}, unified {unified:.3}, without room {bent:.3}");
+    told
+}
+
+/// Three paths to train on, by what they are.
+fn training(machine: &Machine) -> [(&'static str, [Vec<Vec<f64>>; 3]); 5] {
+    let run = |length, bar, angles: Option<fn(f64) -> (f64, f64)>| path(machine, length, bar, angles, 180);
+    let (m, t) = (Bar::Machine, Bar::Table);
+    let paper = run(0.1, m, None);
+    let tilted = |bar| run(0.1, bar, Some(|phi| (degrees(45.0 + 10.0 * phi.cos()), phi)));
+    let swung = || run(0.1, m, Some(|phi| (degrees(45.0 + 30.0 * phi.sin()), phi)));
+    [
+        ("paper, cone on the table, paper at 150 mm", [paper.clone(), run(0.1, t, None), run(0.15, m, None)]),
+        ("paper, cone on the table, A = 45 + 30 sin", [paper.clone(), run(0.1, t, None), swung()]),
+        ("paper, paper at 150 mm, A = 45 + 10 cos", [paper.clone(), run(0.15, m, None), tilted(m)]),
+        ("paper, A = 45 + 10 cos, A = 45 + 30 sin", [paper, tilted(m), swung()]),
+        (
+            "cones on the table, 100 and 150 mm, A = 45 + 10 cos",
+            [run(0.1, t, None), tilted(t), run(0.15, t, None)],
+        ),
+    ]
+}
+
+/// How near the best they come depends on the tables and on the three paths (1.09 to 1.44, docs/directions.md), so that no limit
+/// on it is asserted: 1.15 holds for some draws only.
+#[test]
+fn on_paths_not_trained_on_pieces_are_one_model_and_room_for_error_motions_helps() {
+    let machine = common::machine("ac_table_tilting_paper");
+    let [(_, trained), ..] = training(&machine);
+    let told = elsewhere(&machine, &trained, 0);
+    assert!((told.median - 1.0).abs() < 0.01 && told.worst <= 1.1);
+    let [pieces, unified, bent] = told.to_best;
+    assert!(pieces < bent && unified < bent);
+}
+
+/// Other tables and other paths than the constants were chosen with.
+#[test]
+fn comparison_on_tables_and_training_paths_that_nothing_was_chosen_with() {
+    if std::env::var_os("KINCAL_COMPARE").is_none() {
+        println!("skipped: set KINCAL_COMPARE=1 to compare");
+        return;
+    }
+    let machine = common::machine("ac_table_tilting_paper");
+    let sets = training(&machine);
+    let twice = [(&sets[0], 2000)].into_iter();
+    for ((name, trained), first_seed) in sets.iter().map(|set| (set, 1000)).chain(twice) {
+        println!("trained on {name}, tables from {first_seed}");
+        let told = elsewhere(&machine, trained, first_seed);
+        assert!(told.to_best[0] < told.to_best[2], "room for error motions helps");
+    }
 }
