@@ -50,17 +50,7 @@ pub fn diagnose(
     let linear = linear(machine, recordings, request.options, &facts.dead_bands, progress)?;
     let candidates = library.candidates(machine, &facts);
     let runs = noise::runs(&linear);
-    let out = noise::outliers(&linear, &linear.residual, &runs);
-    if std::env::var("KINCAL_TRACE").is_ok() {
-        let mut by: std::collections::BTreeMap<&str, (usize, usize)> = Default::default();
-        for c in &candidates.all {
-            let e = by.entry(&c.effect).or_default();
-            e.0 += 1;
-            e.1 += c.grid.len() * c.coefficients.len();
-        }
-        let sum: usize = by.values().map(|e| e.1).sum();
-        eprintln!("rows {} candidates {} columns {sum}: {by:?}", linear.residual.len(), candidates.all.len());
-    }
+    let out = noise::outliers(&linear.residual, &runs);
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
 
@@ -84,13 +74,12 @@ pub fn diagnose(
         let same = active.iter().map(|a| a.candidate).eq(before.iter().copied());
         let settled = round > 0 && same || active.is_empty() || facts_are_smooth(&facts) && round > 0;
         if settled || round + 1 == NOISE_ROUNDS {
-            result = Some(finding::report(&search, &active, machine, library, &candidates, &noise));
+            result = Some(finding::report(&search, &active, machine, library, &noise));
             break;
         }
         left = finding::residual_of(&search, &active);
     }
-    let (diagnosis, _) = result.expect("the last round reports");
-    Ok(diagnosis)
+    Ok(result.expect("the last round reports"))
 }
 
 fn facts_are_smooth(facts: &RecordingFacts) -> bool {

@@ -6,7 +6,8 @@ use serde::Serialize;
 use super::held_out::{self, Model};
 use super::noise::Noise;
 use super::search::{Active, Rival, Search};
-use crate::effects::{Candidates, Identified, Library};
+use crate::effects::{Identified, Library};
+use crate::identify::BeforeAfter;
 use crate::machine::Machine;
 
 /// Everything that a diagnosis has to say. Numbers in SI; `docs/diagnosis.md` lists the fields.
@@ -172,9 +173,8 @@ pub(super) fn report(
     active: &[Active],
     machine: &Machine,
     library: &Library,
-    candidates: &Candidates,
     noise: &[Noise],
-) -> (Diagnosis, Vec<usize>) {
+) -> Diagnosis {
     let linear = search.rows.linear;
     let geometric = search.leftover(&search.base);
     let full = search.beside(active, None);
@@ -184,19 +184,6 @@ pub(super) fn report(
     .max(0.0);
     let share_left = left.energy / (left.energy + explained).max(1e-300);
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || share_left > TOLERATED);
-    if std::env::var("KINCAL_TRACE").is_ok() {
-        eprintln!(
-            "geometric: energy {:.0} beyond {:.1} heat {:.2}; left: energy {:.0} beyond {:.1} heat {:.2}; explained {:.0}; share left {:.2}",
-            geometric.energy,
-            geometric.beyond,
-            geometric.heat,
-            left.energy,
-            left.beyond,
-            left.heat,
-            explained,
-            share_left
-        );
-    }
     let noise_of = |angle: bool| {
         let own = search
             .runs
@@ -211,20 +198,6 @@ pub(super) fn report(
     for (i, effect) in active.iter().enumerate() {
         let space = search.beside(active, Some(i));
         let rivals = search.rivals(&space, left.heat);
-        if std::env::var("KINCAL_TRACE").is_ok() {
-            for r in rivals.iter().take(6) {
-                let c = &search.candidates[r.candidate];
-                eprintln!(
-                    "   {i}: {} @ {}  weight {:.1} gain {:.1} {:?} k={}",
-                    c.effect,
-                    c.place.name(machine),
-                    r.weight,
-                    r.score.gain,
-                    r.score.parameters,
-                    r.score.coefficients
-                );
-            }
-        }
         let own = rivals.iter().find(|r| r.candidate == effect.candidate);
         let Some(own) = own.filter(|r| r.weight > TOLD) else { continue };
         if is_unexplained {
@@ -267,7 +240,7 @@ pub(super) fn report(
             delta_bic: 2.0 * own.weight,
             held_out_rms_m: None,
             held_out_rms_rad: None,
-            r#where: wheres(search, &effect.columns, geometric.energy + 1e-300),
+            r#where: wheres(search, &effect.columns),
             confusable_with,
         });
         kept.push(i);
@@ -292,22 +265,37 @@ pub(super) fn report(
             ),
         }
     });
+    let told: Vec<Active> = kept.iter().map(|i| active[*i].clone()).collect();
+    let left_over = Model::new(search, &told).residual(search, &told);
     let recordings = linear.spans.iter().map(|s| s.label.clone()).collect();
-    let diagnosis = Diagnosis {
+    Diagnosis {
         machine: machine.name().into(),
         recordings,
         samples: linear.lines.len() as u64,
         noise_floor_m: noise_of(false),
         noise_floor_rad: noise_of(true),
-        rms_m: None,
-        rms_rad: None,
+        rms_m: by_model(linear.fit.rms_m, rms_of(search, &left_over, false)),
+        rms_rad: by_model(linear.fit.rms_rad, rms_of(search, &left_over, true)),
         held_out_rms_m: None,
         held_out_rms_rad: None,
         findings,
         unexplained,
-    };
-    let _ = candidates;
-    (diagnosis, kept)
+    }
+}
+
+fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {
+    let (fit, last) = (fit?, last?);
+    Some(RmsByModel { nominal: fit.nominal, geometric: fit.geometric, r#final: last })
+}
+
+/// Root mean square over samples of the norm of residual lengths or angles.
+fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
+    let linear = search.rows.linear;
+    let rows = || (0..residual.len()).filter(|row| linear.angle[*row] == angle);
+    let mut samples: Vec<usize> = rows().map(|row| linear.sample[row]).collect();
+    samples.dedup();
+    let squares: f64 = rows().map(|row| residual[row] * residual[row]).sum();
+    (!samples.is_empty()).then(|| (squares / samples.len() as f64).sqrt())
 }
 
 fn confusable(
@@ -333,9 +321,8 @@ fn confusable(
 }
 
 /// In which recordings an effect's columns have their energy, and when.
-fn wheres(search: &Search, columns: &DMatrix<f64>, total: f64) -> Vec<Where> {
+fn wheres(search: &Search, columns: &DMatrix<f64>) -> Vec<Where> {
     let linear = search.rows.linear;
-    let _ = total;
     let energy = |row: usize| columns.row(row).norm_squared();
     let all: f64 = columns.norm_squared().max(1e-300);
     let mut list: Vec<Where> = Vec::new();

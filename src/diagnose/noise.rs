@@ -60,7 +60,7 @@ fn is_pause(span: &Span, last: Option<f64>, now: Option<f64>) -> bool {
 }
 
 /// Rows that lie far off their neighbours: by the median of the two on either side.
-pub(super) fn outliers(linear: &Linear, residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
+pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
     let mut out = vec![false; residual.len()];
     for run in runs.iter().filter(|run| run.len() > 20) {
         let mut off: Vec<(usize, f64)> = Vec::with_capacity(run.len());
@@ -81,7 +81,6 @@ pub(super) fn outliers(linear: &Linear, residual: &[f64], runs: &[Vec<usize>]) -
             run.iter().for_each(|row| out[*row] = false);
         }
     }
-    let _ = linear;
     out
 }
 

@@ -42,8 +42,13 @@ const CLOSE: f64 = 0.6;
 const REFINED: usize = 8;
 /// Coefficients of effects that are taken in may be this many times the usual size.
 pub(super) const ROOM: f64 = 4.0;
+/// An effect that takes away less than this part of the structure that is left is a poor name for it.
+const WORTH: f64 = 0.2;
+/// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
+const OWN_SHAPE: f64 = 0.004;
+const OTHER_SHAPE: f64 = 0.001;
 /// More effects are not looked for.
-const MOST: usize = 6;
+const MOST: usize = 5;
 /// Logarithm of the odds at which an effect is taken in.
 const ENTER: f64 = 3.0;
 
@@ -94,32 +99,28 @@ impl Search<'_> {
     }
 
     /// Forward with full comparison, and after each step every effect against all others in its place.
+    ///
+    /// A step counts only if its evidence stands out from the structure that it leaves, and if it takes away more than the shape of
+    /// what was found before may be off by.
     pub fn run(&self) -> Vec<Active> {
         let mut active: Vec<Active> = Vec::new();
         while active.len() < MOST {
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let space = self.beside(&active, None);
             let rivals = self.rivals(&space, 1.0);
-            if std::env::var("KINCAL_TRACE").is_ok() {
-                for r in rivals.iter().take(4) {
-                    let c = &self.candidates[r.candidate];
-                    eprintln!(
-                        "step {}: {} @ {:?} weight {:.1} gain {:.1} {:?} k={}",
-                        active.len(),
-                        c.effect,
-                        c.place,
-                        r.weight,
-                        r.score.gain,
-                        r.score.parameters,
-                        r.score.coefficients
-                    );
-                }
-                let l = self.leftover(&space);
-                eprintln!("   left energy {:.0} beyond {:.1} heat {:.2}", l.energy, l.beyond, l.heat);
-            }
             let Some(best) = rivals.first().filter(|r| r.weight > ENTER) else { break };
+            let structure = self.leftover(&space).energy;
+            if best.score.gain < self.shape_error(best, &active) || 2.0 * best.score.gain < WORTH * structure
+            {
+                break;
+            }
             let Some(entered) = self.enter(best) else { break };
             active.push(entered);
+            let left = self.leftover(&self.beside(&active, None));
+            if best.weight < ENTER * left.heat {
+                active.pop();
+                break;
+            }
             if active.len() > 1 {
                 self.swap(&mut active);
             }
@@ -127,9 +128,18 @@ impl Search<'_> {
         active
     }
 
+    /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place.
+    fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
+        let place = |candidate: usize| self.candidates[candidate].place.dyad();
+        let share = |effect: &Active| {
+            if place(effect.candidate) == place(rival.candidate) { OWN_SHAPE } else { OTHER_SHAPE }
+        };
+        active.iter().map(|effect| share(effect) * effect.score.gain).sum()
+    }
+
     /// Every effect gives its place to a better one, beside the others; one that is no longer needed goes.
     fn swap(&self, active: &mut Vec<Active>) {
-        for _ in 0..3 {
+        for _ in 0..2 {
             let mut changed = false;
             let mut i = 0;
             while i < active.len() {

@@ -7,10 +7,9 @@ use super::evaluator::Moment;
 use super::source::{Known, Sources};
 use super::unknowns::{Layout, Unknowns};
 use super::{
-    Evaluator, Fit, Found, Info, Model, Options, Placed, Problem, calibrated, enough_for_setups,
-    enough_to_start, fit, information, is_of_setup, place, settle,
+    Evaluator, Fit, Found, Info, Model, Options, Placed, Problem, enough_for_setups, enough_to_start, fit,
+    information, is_of_setup, place, settle,
 };
-use crate::calibration::CalibratedMachine;
 use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions};
 use crate::machine::Machine;
@@ -38,7 +37,6 @@ pub(crate) struct Span {
 
 /// Rows of all recordings, one per scalar reading, sample by sample.
 pub(crate) struct Linear {
-    pub calibrated: CalibratedMachine,
     pub fit: Fit,
     pub spans: Vec<Span>,
     /// Measured less modelled, m or rad.
@@ -102,7 +100,6 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[
     let kept = |source: &super::source::Source| source.summary.samples.div_ceil(stride) as usize;
     let count: usize = sources.all.iter().map(|s| kept(s) * s.sensor.reading_count()).sum();
     let mut linear = Linear {
-        calibrated: calibrated(machine, sources, found),
         fit,
         spans: Vec::new(),
         residual: Vec::with_capacity(count),
