@@ -170,11 +170,14 @@ fn summary(
     } else {
         text.push_str("no constant deviations\n");
     }
-    if plant.varies() {
-        text.push_str("joints with play\n");
+    if plant.varies_with_direction() {
+        text.push_str("deviations that change with directions of travel, as the machine file says\n");
     }
-    if args.truth.is_some() && plant.varies() {
-        text.push_str("the file of the truth holds the constant deviations only, not what varies with position or direction\n");
+    if plant.varies_with_position() {
+        text.push_str("joints with play\n");
+        if args.truth.is_some() {
+            text.push_str("the file of the truth does not hold the play\n");
+        }
     }
     text
 }
