@@ -136,6 +136,10 @@ fn summary(
         ]
     });
     text.push_str(&table("  ", &[false, true, true], &lines.collect::<Vec<_>>()));
+    if rows == 0 {
+        text.push_str("note: nothing moves, so there is no sample\n");
+        return text;
+    }
     text.push_str("travel used\n");
     let mut lines = Vec::new();
     for (c, name) in machine.commands().iter().enumerate() {
@@ -198,7 +202,8 @@ fn result(
 ) -> serde_json::Value {
     let travel = |w: &Written| -> Vec<serde_json::Value> {
         let one = |(name, (from, to)): (&String, &(f64, f64))| json!({"joint": name, "from": from, "to": to});
-        machine.commands().iter().zip(&w.travel).map(one).collect()
+        // Without a sample there is no range.
+        machine.commands().iter().zip(&w.travel).filter(|(_, (from, to))| from <= to).map(one).collect()
     };
     let recordings: Vec<serde_json::Value> = files
         .iter()
