@@ -85,10 +85,10 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Looks where every joint with play moves first. `pause`: time between two recordings, s; `seed`: of the noise.
+    /// Looks where every joint moves first that has play or is keyed on its direction. `pause`: time between two recordings, s; `seed`: of the noise.
     ///
     /// # Errors
-    /// Those of the courses.
+    /// Those of the courses and of [`Plant::first_directions`].
     pub fn new(plant: &'a Plant, runs: &'a [Run], style: &'a Style, pause: f64, seed: u64) -> Result<Self> {
         let all = runs.iter().map(|run| run.course.samples()).collect::<Result<Vec<_>>>()?;
         let state = plant.start(plant.first_directions(all.into_iter().flatten())?);
@@ -159,6 +159,9 @@ pub fn random_commands(machine: &Machine, count: usize, seed: u64) -> Vec<Vec<f6
 /// A recording of `machine` in the form that kincal reads, in m and rad; `extra_header` goes in as it is, one line each.
 ///
 /// The short way for tests: the header says nothing of the instrument but its kind, and samples follow each other by 10 ms.
+///
+/// # Panics
+/// If the machine's deviations depend on features of the path.
 pub fn recording(
     machine: &CalibratedMachine,
     instrument: &Instrument,
@@ -167,7 +170,15 @@ pub fn recording(
     seed: u64,
 ) -> String {
     let (plant, nominal, style) = (Plant::new(machine), machine.machine(), Style::si());
-    let mut state = plant.start(Vec::new());
+    let at = |(k, q): (usize, &Vec<f64>)| Sample {
+        time: k as f64 * 0.01,
+        q: q.clone(),
+        directions: None,
+        recorded: true,
+        at: At::Pose(k + 1),
+    };
+    let first = plant.first_directions(commands.iter().enumerate().map(at).map(Ok));
+    let mut state = plant.start(first.unwrap_or_else(|e| panic!("{e}")));
     let mut rng = StdRng::seed_from_u64(seed);
     // The points are the caller's to tell.
     let silent = Instrument::new(instrument.sensor.clone(), 0.0, 0.0);
@@ -182,10 +193,9 @@ pub fn recording(
         let _ = writeln!(text, "{line}");
     }
     for (k, q) in commands.iter().enumerate() {
-        let time = k as f64 * 0.01;
-        let sample = Sample { time, q: q.clone(), directions: None, recorded: true, at: At::Pose(k + 1) };
+        let sample = at((k, q));
         plant.advance(&mut state, &sample);
-        let _ = write!(text, "{time:.3}");
+        let _ = write!(text, "{:.3}", sample.time);
         q.iter().for_each(|x| {
             let _ = write!(text, ",{x:.17}");
         });

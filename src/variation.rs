@@ -85,6 +85,16 @@ impl Variation {
         self.varying.directions.is_none() || self.samples.get(piece).is_some_and(|n| *n > 0)
     }
 
+    /// Whether a piece that was found agrees with this one in every axis that moves: an axis that never moves stands for the mean of
+    /// both its directions.
+    pub fn has_seen_alike(&self, piece: usize) -> bool {
+        let Some(directions) = &self.varying.directions else { return true };
+        let pattern = directions.pattern(piece);
+        let alike =
+            |seen: usize| directions.pattern(seen).iter().zip(&pattern).all(|(s, p)| *p == 0 || s == p);
+        (0..self.samples.len()).any(|seen| self.has_seen(seen) && alike(seen))
+    }
+
     /// What the directions of a piece add to the constant deviation of every dyad, m and rad.
     pub fn direction_part(&self, piece: usize, dyads: usize) -> Vec<Twist<f64>> {
         let zero = vec![Twist::zero(0.0); dyads];

@@ -5,13 +5,17 @@
 use std::fmt::Write;
 
 use kincal::compensate::{Options, Setup, compensate_text};
-use kincal::identify::{Options as Fitting, calibrate};
+use kincal::identify::{Model, Options as Fitting, calibrate, calibrate_model};
 use kincal::inverse::{Goal, Inverse, Mode};
 use kincal::lie::{Pose, Vec3};
 use kincal::machine::JointKind;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
-use kincal::simulate::{Instrument, random_commands, random_deviations, recording};
+use kincal::simulate::{
+    At, Claims, Faults, Instrument, Plant, RandomPoses, Run, Sample, Style, random_commands,
+    random_deviations, recording, recordings,
+};
+use kincal::variation::{Directions, Varying};
 use kincal::{CalibratedMachine, Chain, Machine};
 
 mod common;
@@ -224,6 +228,107 @@ fn a_measured_machine_cuts_what_its_corrected_program_means() {
             assert!(after.0 < 0.05 * before.0, "{name} tcp {tcp}: tip {before:?} to {after:?}");
             assert!(after.1 < 0.1 * before.1, "{name} tcp {tcp}: axis {before:?} to {after:?}");
             assert_eq!(corrected.lines().count(), text.lines().count(), "{name}");
+        }
+    }
+}
+
+/// As [`errors`], on a machine whose play remembers how it came to each block's end.
+fn errors_with_play(plant: &Plant, path: &[Vec<f64>], sent: &[Vec<f64>]) -> (f64, f64) {
+    assert_eq!(path.len(), sent.len());
+    let sample = |(k, q): (usize, &Vec<f64>)| Sample {
+        time: k as f64,
+        q: q.clone(),
+        directions: None,
+        recorded: true,
+        at: At::Pose(k + 1),
+    };
+    let first = plant.first_directions(sent.iter().enumerate().map(sample).map(Ok)).expect("samples");
+    let mut state = plant.start(first);
+    let (mut m, mut rad) = (0.0, 0.0);
+    for (k, (q, now)) in path.iter().zip(sent).enumerate() {
+        plant.advance(&mut state, &sample((k, now)));
+        let (wanted, is) = (meant(plant.machine(), q), state.chain().w_from_t(now));
+        m += (wanted.translation - is.translation).norm().powi(2);
+        rad += wanted.rotation.column(2).cross(is.rotation.column(2)).norm().powi(2);
+    }
+    let count = path.len() as f64;
+    ((m / count).sqrt(), (rad / count).sqrt())
+}
+
+#[test]
+fn a_machine_with_play_cuts_better_when_its_program_is_corrected_piece_by_piece() {
+    // Tables, heads and one of each.
+    for (k, (name, machine)) in five_axis().into_iter().enumerate().step_by(3) {
+        let rotary: Vec<usize> =
+            (0..5).filter(|c| machine.command_joint(*c).kind == JointKind::Revolute).collect();
+        let plays: Vec<String> = (rotary.iter().zip([120, 90]))
+            .map(|(c, width)| format!("(joint: \"{}\", width: {width})", machine.commands()[*c]))
+            .collect();
+        let faults = format!("Faults(units: (length: um, angle: urad), backlash: [{}])", plays.join(", "));
+        let faults = Faults::parse("faults.ron", &faults, &machine).unwrap_or_else(|e| panic!("{e}"));
+        let plant = Plant::new(&CalibratedMachine::nominal(machine.clone()))
+            .with_random(1.0, 500 + k as u64)
+            .with_faults(&faults);
+        let course = RandomPoses { machine: machine.clone(), count: 300, seed: 9, rate: 1.0 };
+        let run = Run {
+            course: Box::new(course),
+            instrument: Instrument::new(Sensor::Pose, 3e-7, 3e-6),
+            claims: Claims::default(),
+            directions: true,
+        };
+        let texts = recordings(&plant, &[run], &Style::si(), 4).unwrap_or_else(|e| panic!("{e}"));
+        let measured =
+            Recording::from_bytes("rec.csv", texts[0].as_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"));
+        // The path's steps are fine where an axis turns round.
+        let model = Model {
+            varying: Varying { directions: Some(Directions::new(rotary.clone())), terms: Vec::new() },
+            dead_bands: vec![Some(1e-7); 5],
+            ..Model::default()
+        };
+        let (pieces, _) = calibrate_model(&machine, &[measured], &model, Fitting::default(), &|_| {})
+            .unwrap_or_else(|e| panic!("{e}"));
+        let pieces =
+            CalibratedMachine::parse("pieces.ron", &pieces.to_ron()).unwrap_or_else(|e| panic!("{e}"));
+        let constant = calibrated_from(&machine, &texts);
+        let path = path(&machine, blocks());
+        // The lines at which a rotary axis turns round, behind the first block's.
+        let reversed = |k: usize| {
+            rotary.iter().any(|c| (path[k][*c] - path[k - 1][*c]) * (path[k - 1][*c] - path[k - 2][*c]) < 0.0)
+        };
+        for tcp in [true, false] {
+            let (text, setup) = (program(&machine, &path, tcp), setup(&machine, tcp));
+            let before = text.lines().take_while(|line| !line.starts_with('N')).count();
+            let correct = |model| {
+                compensate_text(model, "path.nc", &text, &setup, &Options::default())
+                    .unwrap_or_else(|e| panic!("{name}: {e}"))
+            };
+            let ((by_pieces, report), (by_constant, steady)) = (correct(&pieces), correct(&constant));
+            let of = |text: &str| errors_with_play(&plant, &path, &execute(&machine, text, tcp));
+            let (plain, with, without) = (of(&text), of(&by_pieces), of(&by_constant));
+            println!(
+                "{name} tcp {tcp}: tip {:.2} um, constant {:.3}, pieces {:.3}; axis {:.2} urad, constant {:.3}, pieces {:.3}; {} reversals, {:.2} um",
+                plain.0 * 1e6,
+                without.0 * 1e6,
+                with.0 * 1e6,
+                plain.1 * 1e6,
+                without.1 * 1e6,
+                with.1 * 1e6,
+                report.reversals.count,
+                report.largest_reversal_m.value * 1e6
+            );
+            assert!(with.0 < 0.3 * without.0, "{name} tcp {tcp}: {with:?} against {without:?}");
+            assert!(with.0 < 0.05 * plain.0, "{name} tcp {tcp}: {with:?} of {plain:?}");
+            let second = before + 2;
+            let told: Vec<usize> =
+                report.reversals.first.iter().map(|r| r.line).filter(|l| *l > second).collect();
+            let mut expected: Vec<usize> =
+                (2..path.len()).filter(|k| reversed(*k)).map(|k| before + k + 1).collect();
+            assert!(expected.len() > 4, "{name}: {expected:?}");
+            expected.truncate(told.len());
+            assert_eq!(told, expected, "{name} tcp {tcp}");
+            assert!(report.reversals.count >= expected.len() as u64 && steady.reversals.count == 0);
+            assert!(report.largest_reversal_m.value > 1e-6, "{name}: {:?}", report.largest_reversal_m);
+            assert_eq!(report.unseen_directions.count, 0, "{name}: {:?}", report.unseen_directions);
         }
     }
 }

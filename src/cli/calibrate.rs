@@ -60,7 +60,7 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 30)]
     steps: usize,
     /// Relative singular value below which rank-truncation takes a direction as not seen
-    #[arg(long, default_value_t = 1e-3, value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1e-3, value_parser = relative, allow_negative_numbers = true)]
     cut: f64,
     /// How residuals count
     #[arg(long, value_enum, default_value = "huber")]
@@ -75,7 +75,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "AXES", value_delimiter = ',')]
     directions: Vec<String>,
     /// Motion against the direction of travel that is still no reversal, such as a=0.01deg (1e-5 of the range unless given)
-    #[arg(long, value_name = "AXIS=SIZE", value_delimiter = ',')]
+    #[arg(long, value_name = "AXIS=SIZE", value_delimiter = ',', requires = "directions")]
     dead_band: Vec<String>,
     /// Use so many samples of each piece of the model, evenly spread, and judge it on the others
     #[arg(long, value_name = "N", value_parser = whole, allow_negative_numbers = true)]
@@ -111,6 +111,13 @@ impl Args {
         for text in &self.dead_band {
             let (name, size) = text.split_once('=').unwrap_or((text, ""));
             let c = command(machine, name)?;
+            if !axes.contains(&c) {
+                let what = format!("--dead-band {text} is of an axis that the model is not keyed on");
+                return Err(Failure::Told {
+                    what,
+                    mend: format!("add {name} to --directions, or leave it out"),
+                });
+            }
             let quantity = match machine.command_joint(c).kind {
                 JointKind::Prismatic => Quantity::Length,
                 JointKind::Revolute => Quantity::Angle,
@@ -195,6 +202,14 @@ fn share(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A number above zero and below one.
+pub(super) fn relative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
+        _ => Err("expected a number above zero and below one".into()),
+    }
+}
+
 /// A number above zero.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -253,6 +268,9 @@ fn render_pieces(fit: &Fit) -> String {
     };
     let _ = writeln!(text, "\n{title}");
     text.push_str(&table("  ", &[false, true, true, true, true, true, true][..rows[0].len()], &rows));
+    if fit.held_out.as_ref().is_some_and(|held_out| held_out.model.samples == 0) {
+        text.push_str("note: --samples took all there are; none is left to judge the model on\n");
+    }
     text
 }
 

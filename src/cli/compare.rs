@@ -8,7 +8,7 @@ use kincal::{CalibratedMachine, Machine};
 use serde::Serialize;
 
 use super::Common;
-use super::calibrate::positive;
+use super::calibrate::{positive, relative};
 use super::output::{
     Failure, Outcome, angle, check_outputs, count, length, open_machine, open_recording, table,
 };
@@ -37,7 +37,7 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = Tuning::default().tau, value_parser = positive, allow_negative_numbers = true)]
     tau: f64,
     /// Relative singular value below which a direction is truncated
-    #[arg(long, default_value_t = Tuning::default().cut, value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = Tuning::default().cut, value_parser = relative, allow_negative_numbers = true)]
     cut: f64,
     /// Steps of the damped and truncated schemes
     #[arg(long, default_value_t = Tuning::default().steps)]

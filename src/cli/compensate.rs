@@ -205,6 +205,18 @@ fn notes(r: &Report) -> String {
             lines(&r.reversals, |x| x.line)
         );
     }
+    if r.unseen_directions.count > 0 {
+        let pieces: std::collections::BTreeSet<&str> =
+            r.unseen_directions.first.iter().map(|x| x.piece.as_str()).collect();
+        let pieces: Vec<&str> = pieces.into_iter().collect();
+        let _ = writeln!(
+            text,
+            "note: at {} the axes travel in a pattern of directions that the calibration has not seen ({}); corrected by what single directions have shown: {}",
+            count(r.unseen_directions.count, "block", "blocks"),
+            pieces.join(", "),
+            lines(&r.unseen_directions, |x| x.line)
+        );
+    }
     if r.cycles > 0 {
         let _ = writeln!(
             text,

@@ -136,6 +136,10 @@ fn summary(
         ]
     });
     text.push_str(&table("  ", &[false, true, true], &lines.collect::<Vec<_>>()));
+    if rows == 0 {
+        text.push_str("note: nothing moves, so there is no sample\n");
+        return text;
+    }
     text.push_str("travel used\n");
     let mut lines = Vec::new();
     for (c, name) in machine.commands().iter().enumerate() {
@@ -170,11 +174,14 @@ fn summary(
     } else {
         text.push_str("no constant deviations\n");
     }
-    if plant.varies() {
-        text.push_str("joints with play\n");
+    if plant.varies_with_direction() {
+        text.push_str("deviations that change with directions of travel, as the machine file says\n");
     }
-    if args.truth.is_some() && plant.varies() {
-        text.push_str("the file of the truth holds the constant deviations only, not what varies with position or direction\n");
+    if plant.varies_with_position() {
+        text.push_str("joints with play\n");
+        if args.truth.is_some() {
+            text.push_str("the file of the truth does not hold the play\n");
+        }
     }
     text
 }
@@ -195,7 +202,8 @@ fn result(
 ) -> serde_json::Value {
     let travel = |w: &Written| -> Vec<serde_json::Value> {
         let one = |(name, (from, to)): (&String, &(f64, f64))| json!({"joint": name, "from": from, "to": to});
-        machine.commands().iter().zip(&w.travel).map(one).collect()
+        // Without a sample there is no range.
+        machine.commands().iter().zip(&w.travel).filter(|(_, (from, to))| from <= to).map(one).collect()
     };
     let recordings: Vec<serde_json::Value> = files
         .iter()

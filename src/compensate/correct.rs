@@ -1,7 +1,7 @@
 //! One position corrected, `docs/compensate.md` (C9) to (C11), and the numbers that say so in the block.
 
 use super::follower::{Follower, Position, Status};
-use super::report::{OutOfTravel, Reversal, SingularBlock, Unreached, Unseen, UnseenPattern};
+use super::report::{OutOfTravel, Reversal, SingularBlock, Unreached, Unseen, UnseenPattern, UnseenPiece};
 use crate::error::Result;
 use crate::identify::COMPONENTS;
 use crate::inverse::{Goal, Outcome};
@@ -55,6 +55,9 @@ impl Follower<'_> {
         if self.extrapolated != line && self.model.extrapolates(q) {
             self.extrapolated = line;
             self.report.extrapolated_moves += 1;
+        }
+        if let Some(piece) = self.model.unseen_piece() {
+            self.report.unseen_directions.push_once(UnseenPiece { line, piece }, line);
         }
         let Some((meant, sent, piece)) = self.last.take() else { return };
         if piece != self.model.piece() {

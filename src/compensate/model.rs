@@ -2,6 +2,7 @@
 
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
+use crate::error::{Error, Result};
 use crate::lie::Twist;
 use crate::motion::Tracker;
 use crate::variation::Directions;
@@ -9,8 +10,7 @@ use crate::variation::Directions;
 /// A machine that is told where it is sent, one commanded position after the other.
 ///
 /// Errors may depend on how a position was reached. A model keeps what that takes (directions of travel with
-/// a dead band, play); standing still changes nothing, and before the first motion the directions are those
-/// of the first motion.
+/// a dead band, play); standing still changes nothing.
 pub trait Model {
     /// Takes the next commanded position into account, m or rad, machine order.
     fn advance(&mut self, commands: &[f64]);
@@ -20,6 +20,11 @@ pub trait Model {
 
     /// Which set of deviations [`Model::chain`] comes from; where it changes, the correction steps.
     fn piece(&self) -> usize;
+
+    /// The name of that set where no recording has shown it, and it is put together from others.
+    fn unseen_piece(&self) -> Option<String> {
+        None
+    }
 
     /// Whether no position has any error.
     fn is_nominal(&self) -> bool;
@@ -37,11 +42,20 @@ pub trait Model {
 }
 
 /// The model of a calibrated machine.
-pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Box<dyn Model + '_> {
-    match &calibrated.variation().varying.directions {
+///
+/// # Errors
+/// [`Error::Undetermined`] where deviations depend on features of the path: a program is not followed in time.
+pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Result<Box<dyn Model + '_>> {
+    let varying = &calibrated.variation().varying;
+    if !varying.terms.is_empty() {
+        let what = format!("{}: its deviations depend on features of the path", calibrated.machine().name());
+        let mend = "calibrate with constant deviations or with pieces by direction, then compensate";
+        return Err(Error::Undetermined { what, mend: mend.into() });
+    }
+    Ok(match &varying.directions {
         Some(directions) => Box::new(Pieces::new(calibrated, directions)),
         None => Box::new(Constant { calibrated, chain: calibrated.chain() }),
-    }
+    })
 }
 
 /// One set of deviations for each pattern of directions of travel.
@@ -95,6 +109,11 @@ impl Model for Pieces<'_> {
         self.piece
     }
 
+    fn unseen_piece(&self) -> Option<String> {
+        let seen = self.calibrated.variation().has_seen_alike(self.piece);
+        (!seen).then(|| self.directions.name(self.calibrated.machine(), self.piece))
+    }
+
     fn is_nominal(&self) -> bool {
         is_zero(self.calibrated.deviations())
             && self.calibrated.variation().parts.iter().all(|part| is_zero(part))
@@ -106,6 +125,7 @@ impl Model for Pieces<'_> {
 
     fn restart(&mut self) {
         self.tracker = at_rest(self.calibrated);
+        self.piece = self.directions.piece(&self.tracker.directions());
     }
 
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {

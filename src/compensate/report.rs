@@ -68,6 +68,15 @@ pub struct Reversal {
     pub step_rad: f64,
 }
 
+/// The axes travel in a pattern of directions that no recording has shown.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnseenPiece {
+    /// Line of the block.
+    pub line: usize,
+    /// Name of the pattern, such as `AFCR`.
+    pub piece: String,
+}
+
 /// A joint that would leave its travel.
 #[derive(Clone, Debug, Serialize)]
 pub struct OutOfTravel {
@@ -142,6 +151,9 @@ pub struct Report {
     pub reversals: Listed<Reversal>,
     /// Largest of these steps.
     pub largest_reversal_m: Worst,
+    /// Blocks in a pattern of directions that the calibration has not seen; they are corrected by what single directions have
+    /// shown.
+    pub unseen_directions: Listed<UnseenPiece>,
     /// Blocks at which a joint would leave its travel.
     pub out_of_travel: Listed<OutOfTravel>,
     /// Blocks at which a direction of the tool is lost.

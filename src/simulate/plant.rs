@@ -8,28 +8,31 @@ use super::faults::{Faults, Width};
 use super::random_deviations;
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::lie::{Pose, Twist};
 use crate::machine::Machine;
-use crate::motion::Play;
+use crate::motion::{Play, Tracker};
+use crate::variation::{Variation, Varying};
 
 /// Movements below this do not count as the first motion of a joint, m or rad: rounding of solved axes.
 const FIRST_MOTION: f64 = 1e-9;
 
 /// A deviation that depends on where the machine stands: displacements of all dyads' joints (m or rad, machine order).
-type Varying = Arc<dyn Fn(&[f64]) -> Twist<f64> + Send + Sync>;
+type ByPosition = Arc<dyn Fn(&[f64]) -> Twist<f64> + Send + Sync>;
 
 /// A machine with everything that is wrong with it.
 ///
-/// Constant deviations of initial poses, joint twists and displacements come down to one twist `dh` per dyad; play and what
-/// else depends on position is added to it sample by sample, in [`Plant::advance`] and nowhere else.
+/// Constant deviations of initial poses, joint twists and displacements come down to one twist `dh` per dyad; what directions of
+/// travel add to it, play, and what else depends on position comes sample by sample, in [`Plant::advance`] and nowhere else.
 #[derive(Clone)]
 pub struct Plant {
     machine: Machine,
     /// Constant deviations, one per dyad.
     constant: Vec<Twist<f64>>,
     backlash: Vec<(usize, Width)>,
-    varying: Vec<(usize, Varying)>,
+    varying: Vec<(usize, ByPosition)>,
+    /// What a calibrated file says of directions of travel.
+    by_direction: Variation,
     /// Frame `w` of the instrument in the machine's frame `w`.
     w_from_instrument: Option<Pose<f64>>,
 }
@@ -40,6 +43,7 @@ impl fmt::Debug for Plant {
             .field("machine", &self.machine.name())
             .field("constant", &self.constant)
             .field("backlash", &self.backlash)
+            .field("by_direction", &self.by_direction.varying.directions)
             .field("varying", &self.varying.iter().map(|(j, _)| j).collect::<Vec<_>>())
             .finish()
     }
@@ -54,6 +58,10 @@ pub struct State {
     /// One per entry of the plant's backlash.
     plays: Vec<Option<Play>>,
     first: Vec<i8>,
+    tracker: Tracker,
+    /// The pattern of directions that holds, and what it adds to the constant deviations.
+    piece: Option<usize>,
+    parts: Vec<Twist<f64>>,
 }
 
 impl State {
@@ -74,13 +82,15 @@ impl State {
 }
 
 impl Plant {
-    /// A machine file as it is, with its constant deviations if it is calibrated.
+    /// A machine file as it is, with its deviations if it is calibrated: the constant ones, and those that change with directions
+    /// of travel.
     pub fn new(machine: &CalibratedMachine) -> Self {
         Plant {
             machine: machine.machine().clone(),
             constant: machine.deviations().to_vec(),
             backlash: Vec::new(),
             varying: Vec::new(),
+            by_direction: machine.variation().clone(),
             w_from_instrument: None,
         }
     }
@@ -165,17 +175,41 @@ impl Plant {
 
     /// Whether there is more than constant deviations.
     pub fn varies(&self) -> bool {
+        !(self.backlash.is_empty() && self.varying.is_empty() && self.by_direction.varying.is_constant())
+    }
+
+    /// Whether deviations depend on position: play, or what [`Plant::with_varying`] added.
+    pub fn varies_with_position(&self) -> bool {
         !(self.backlash.is_empty() && self.varying.is_empty())
     }
 
-    /// Direction of the first motion of every joint with play over the samples, in the order of the backlash.
+    /// Whether deviations change with directions of travel, as a calibrated file says.
+    pub fn varies_with_direction(&self) -> bool {
+        self.by_direction.varying.directions.is_some()
+    }
+
+    /// Directions of the first motion over the samples: of every joint with play, in the order of the backlash; then, where
+    /// deviations change with directions of travel, of every command.
     ///
     /// # Errors
-    /// The first one of the samples.
+    /// The first one of the samples; [`Error::Motion`] where deviations depend on features of the path, which are fitted to
+    /// recordings and not simulated.
     pub fn first_directions(&self, samples: impl Iterator<Item = Result<Sample>>) -> Result<Vec<i8>> {
-        let mut first = vec![0i8; self.backlash.len()];
+        let Varying { directions, terms } = &self.by_direction.varying;
+        if !terms.is_empty() {
+            let what = format!("{}: its deviations depend on features of the path", self.machine.name());
+            let mend = "simulate a machine with constant deviations, pieces by direction, or faults";
+            return Err(Error::Motion { what, mend: mend.into() });
+        }
+        let plays = self.backlash.len();
+        let mut first = vec![0i8; plays];
         let mut start: Option<Vec<f64>> = None;
-        if first.is_empty() {
+        let mut tracker = self.tracker(&[]);
+        let keyed: &[usize] = directions.as_ref().map_or(&[], |directions| directions.axes());
+        first.resize(plays + if keyed.is_empty() { 0 } else { self.machine.commands().len() }, 0);
+        let found =
+            |first: &[i8]| !first[..plays].contains(&0) && keyed.iter().all(|c| first[plays + c] != 0);
+        if found(&first) {
             return Ok(first);
         }
         for sample in samples {
@@ -191,11 +225,26 @@ impl Plant {
                     *first = if gone > 0.0 { 1 } else { -1 };
                 }
             }
-            if !first.contains(&0) {
+            if !keyed.is_empty() {
+                tracker.advance(&sample.q, |c| stated_of_command(&sample, c));
+                let now = tracker.directions();
+                first[plays..].iter_mut().zip(now).filter(|(f, _)| **f == 0).for_each(|(f, now)| *f = now);
+            }
+            if found(&first) {
                 break;
             }
         }
         Ok(first)
+    }
+
+    /// Follows the directions of travel of all commands; `first` as in [`Tracker::new`], or empty.
+    fn tracker(&self, first: &[i8]) -> Tracker {
+        let commands = self.machine.commands().len();
+        let mut bands = self.by_direction.dead_bands.clone();
+        bands.resize(commands, 0.0);
+        let mut first = first.to_vec();
+        first.resize(commands, 0);
+        Tracker::new(bands, first)
     }
 
     /// Nothing has moved yet. `first`: from [`Plant::first_directions`].
@@ -210,7 +259,10 @@ impl Plant {
             deviations: self.constant.clone(),
             displacements: vec![0.0; self.constant.len()],
             plays: vec![None; self.backlash.len()],
+            tracker: self.tracker(first.get(self.backlash.len()..).unwrap_or_default()),
             first,
+            piece: None,
+            parts: vec![Twist::zero(0.0); self.constant.len()],
         }
     }
 
@@ -226,10 +278,24 @@ impl Plant {
         state.displacements = self.machine.displacements(&sample.q);
         let s = &state.displacements;
         let mut touched = vec![false; self.constant.len()];
-        let mut touch = |deviations: &mut [Twist<f64>], j: usize, more: Twist<f64>| {
-            if !std::mem::replace(&mut touched[j], true) {
-                deviations[j] = self.constant[j];
+        if let Some(directions) = &self.by_direction.varying.directions {
+            state.tracker.advance(&sample.q, |c| stated_of_command(sample, c));
+            let piece = directions.piece(&state.tracker.directions());
+            if state.piece.replace(piece) != Some(piece) {
+                // (29)
+                state.parts = self.by_direction.direction_part(piece, self.constant.len());
+                for (j, part) in state.parts.iter().enumerate() {
+                    state.deviations[j] = self.constant[j] + *part;
+                }
+                touched.fill(true);
             }
+        }
+        let mut varied = vec![false; self.constant.len()];
+        let mut touch = |deviations: &mut [Twist<f64>], j: usize, more: Twist<f64>| {
+            if !std::mem::replace(&mut varied[j], true) {
+                deviations[j] = self.constant[j] + state.parts[j];
+            }
+            touched[j] = true;
             deviations[j] = deviations[j] + more;
         };
         for (i, (j, width)) in self.backlash.iter().enumerate() {
@@ -258,4 +324,9 @@ impl Plant {
             state.chain.set_previous_from_frame(j, pose);
         }
     }
+}
+
+/// Direction of approach that a sample states for a command; `None` where it has no such columns.
+fn stated_of_command(sample: &Sample, command: usize) -> Option<i8> {
+    sample.directions.as_ref().and_then(|directions| directions.get(command).copied())
 }
