@@ -1,7 +1,7 @@
 //! What is left when everything named has been taken away: is it noise?
 //!
 //! Sums over blocks of whitened residuals have the variance of noise alone, whatever the length of the block; a misfit that runs
-//! smoothly along the path adds its energy, `docs/diagnosis.md` (66).
+//! smoothly along the path adds its energy, `docs/diagnosis.md` (65).
 
 /// Lengths of blocks, readings.
 const LENGTHS: [usize; 5] = [4, 8, 16, 32, 64];
