@@ -42,7 +42,7 @@ fn rust_files(folder: &Path, found: &mut Vec<PathBuf>) {
 fn equations_are_numbered_from_one_without_gap_or_repetition() {
     let mut numbers: Vec<u32> = equations().iter().filter_map(|label| label.parse().ok()).collect();
     numbers.sort_unstable();
-    assert_eq!(numbers, (1..=33).collect::<Vec<_>>());
+    assert_eq!(numbers, (1..=31).collect::<Vec<_>>());
 }
 
 #[test]
@@ -69,11 +69,8 @@ fn every_equation_cited_in_the_code_exists() {
 
 #[test]
 fn links_between_documents_lead_somewhere() {
-    let docs = fs::read_dir(root().join("docs")).expect("docs/").map(|entry| entry.expect("an entry").path());
-    for path in
-        docs.filter(|path| path.extension().is_some_and(|e| e == "md")).chain([root().join("README.md")])
-    {
-        let document = path.display().to_string();
+    for document in ["README.md", "docs/notation.md", "docs/model.md"] {
+        let path = root().join(document);
         let text = fs::read_to_string(&path).expect("a document");
         for target in text.split("](").skip(1).filter_map(|part| part.split_once(')')) {
             let file = target.0.split('#').next().unwrap_or_default();
