@@ -215,8 +215,8 @@ fn practice_answers_are_read_in_the_same_form() {
 fn the_engine_names_what_a_few_blind_cases_conceal() {
     let binary = PathBuf::from(env!("CARGO_BIN_EXE_kincal"));
     let help = std::process::Command::new(&binary).args(["diagnose", "--help"]).output().expect("runs");
-    if !help.status.success() {
-        println!("skipped: this build has no `diagnose` command");
+    if !String::from_utf8_lossy(&help.stdout).contains("--output") {
+        println!("skipped: `diagnose` of this build does not write the model, which the judge needs");
         return;
     }
     let folder = folder("engine");
