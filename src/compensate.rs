@@ -20,9 +20,10 @@
 //! deviations[2].w.0[2] = 1e-3;
 //! deviations[3].w.0[2] = -1e-3;
 //! let calibrated = CalibratedMachine::nominal(machine).with_deviations(deviations);
-//! let (text, report) = compensate_text(
-//!     &calibrated, "part.nc", "G1 X0. Y0. Z0. F900 (corner)\nY100.\n", &Setup::default(),
-//! &Options::default())?; assert_eq!(text, "G1 X0. Y0. Z0. F900 (corner)\nX.1 Y100.\n");
+//! let program = "G1 X0. Y0. Z0. F900 (corner)\nY100.\n";
+//! let (text, report) =
+//!     compensate_text(&calibrated, "part.nc", program, &Setup::default(), &Options::default())?;
+//! assert_eq!(text, "G1 X0. Y0. Z0. F900 (corner)\nX0.1 Y100.\n");
 //! assert_eq!(report.inserted_words, 1);
 //! # Ok::<(), kincal::Error>(())
 //! ```

@@ -5,7 +5,13 @@ use std::process::{Command, Output};
 
 use kincal::CalibratedMachine;
 use kincal::compensate::Setup;
-use kincal::simulate::random_deviations;
+use kincal::identify::{Model, Options, calibrate_model};
+use kincal::recording::Recording;
+use kincal::sensor::Sensor;
+use kincal::simulate::{
+    Claims, CommandTable, Faults, Instrument, Plant, Run, Style, random_deviations, recordings,
+};
+use kincal::variation::{Directions, Varying};
 
 mod common;
 
@@ -106,4 +112,67 @@ fn the_set_up_of_the_documents_reads_as_it_stands() {
     }
     let wrong = Setup::parse("setup.ron", "Setup(tool: {})").expect_err("a misspelt field");
     assert!(wrong.to_string().starts_with("setup.ron:1:"), "{wrong}");
+}
+
+#[test]
+fn reversals_and_directions_never_seen_are_told_with_their_lines() {
+    let bench =
+        Bench::new("pieces", "G21 G90\nG0 X10 Y20 Z30 A40 C50\nG1 X60 F500\nC40\nA30\nA50\nC41\nM30\n");
+    let machine = common::machine("ac_table_tilting");
+    let faults = "Faults(units: (length: um, angle: urad), backlash: [(joint: \"a\", width: 60), (joint: \"c\", width: 40)])";
+    let faults = Faults::parse("faults.ron", faults, &machine).unwrap_or_else(|e| panic!("{e}"));
+    let plant = Plant::new(&CalibratedMachine::nominal(machine.clone())).with_faults(&faults);
+    // Settled positions, never with both axes from below.
+    let mut table = String::from("a[deg],c[deg],y[mm],x[mm],z[mm],a_direction[1],c_direction[1]\n");
+    for k in 0..120 {
+        let s = f64::from(k);
+        let (a, c) = [(1, -1), (-1, 1), (-1, -1)][k as usize % 3];
+        let at = [
+            60.0 * s.sin(),
+            3.1 * s,
+            200.0 * (1.7 * s).sin(),
+            200.0 * (2.3 * s).cos(),
+            90.0 * (0.9 * s).sin(),
+        ];
+        let at = at.map(|x| format!("{x:.3}")).join(",");
+        table.push_str(&format!("{at},{a},{c}\n"));
+    }
+    std::fs::write(bench.0.join("poses.csv"), table).expect("writable");
+    let course =
+        CommandTable::open(bench.0.join("poses.csv"), &machine, 1.0).unwrap_or_else(|e| panic!("{e}"));
+    let run = Run {
+        course: Box::new(course),
+        instrument: Instrument::new(Sensor::Pose, 1e-7, 1e-6),
+        claims: Claims::default(),
+        directions: true,
+    };
+    let texts = recordings(&plant, &[run], &Style::si(), 1).unwrap_or_else(|e| panic!("{e}"));
+    let measured =
+        Recording::from_bytes("rec.csv", texts[0].as_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"));
+    let axes = ["a", "c"].map(|name| machine.commands().iter().position(|c| c == name).expect("an axis"));
+    let varying = Varying { directions: Some(Directions::new(axes.to_vec())), terms: Vec::new() };
+    let model = Model { varying, ..Model::default() };
+    let (calibrated, _) = calibrate_model(&machine, &[measured], &model, Options::default(), &|_| {})
+        .unwrap_or_else(|e| panic!("{e}"));
+    std::fs::write(bench.0.join("machine.ron"), calibrated.to_ron()).expect("writable");
+    let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let said = text(&out.stdout);
+    // Where the machine came from before line 2 is not known: the mean of both directions until an axis moves again. 4: C down;
+    // 5: A down; 6: A up; 7: C up, A still as it came.
+    let parts = [
+        "at 4 blocks where a direction of travel changes",
+        "lines 4, 5, 6, 7",
+        "at 1 block the axes travel in a pattern of directions that the calibration has not seen (AFCF)",
+        "have shown: line 7",
+    ];
+    for part in parts {
+        assert!(said.contains(part), "{part}\n{said}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&bench.read("out.json").expect("written")).expect("JSON");
+    // A turns round in line 6, with a play of 60 urad.
+    let step = json["reversals"]["first"][2]["step_rad"].as_f64().expect("a number");
+    assert!((step - 60e-6).abs() < 6e-6, "{json}");
+    assert_eq!(json["unseen_directions"]["first"][0], serde_json::json!({"line": 7, "piece": "AFCF"}));
 }

@@ -101,7 +101,7 @@ fn every_equation_cited_in_the_code_exists() {
                 Some((document, after)) => (Some(document), labels(after)),
                 None => {
                     let begins = comment.trim_start_matches(['/', '!']).trim_start();
-                    let first = begins.starts_with('(').then(|| labels(begins)).unwrap_or_default();
+                    let first = if begins.starts_with('(') { labels(begins) } else { Vec::new() };
                     (None, first.into_iter().take(1).collect())
                 }
             };

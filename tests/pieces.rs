@@ -129,13 +129,14 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
             "{name}: {told:?} {with:e}"
         );
         assert_eq!(told.unseen_directions, 0);
-        // So does its simulation, on a path of its own.
+        // So does its simulation, on a path of its own, but for the rounding of frame w: the file holds it as a frame of the
+        // set-up and as a deviation.
         let mut instrument = Instrument::new(Sensor::Position, 0.0, 0.0);
         instrument.state.tool_point_t = kincal::lie::Vec3([0.02, 0.03, -0.09]);
         let point = ["tool_point[mm]: 20,30,-90".to_string()];
         let simulated = open(&machine, &recording(&again, &instrument, &path(&machine, 150), &point, 1));
         let told = predict(&again, &simulated[0], None).unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert!(told.max_m.expect("lengths") < 1e-12, "{name}: {told:?}");
+        assert!(told.max_m.expect("lengths") < 2e-11, "{name}: {told:?}");
         let constant =
             CalibratedMachine::nominal(machine.clone()).with_deviations(again.deviations().to_vec());
         let told = predict(&constant, &simulated[0], None).unwrap_or_else(|e| panic!("{name}: {e}"));

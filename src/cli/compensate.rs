@@ -126,6 +126,14 @@ pub(crate) fn run(args: &Args) -> Outcome {
     drop(progress);
     let Some(report) = report else { return Ok(()) };
     let mut text = render(&report, &args.program.display().to_string());
+    if let Some(tolerance) = args.arcs.filter(|tolerance| report.largest_arc_m.value > *tolerance) {
+        let _ = writeln!(
+            text,
+            "note: --arcs {} is not held, {}: what is left at the ends adds to it (axes never named, digits, reach)",
+            length(tolerance),
+            at(report.largest_arc_m, length)
+        );
+    }
     if let Some(path) = &args.output {
         let _ = writeln!(text, "written to {}", path.display());
     }
