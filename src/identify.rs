@@ -19,6 +19,7 @@ mod stretch;
 mod thin;
 mod unknowns;
 mod unseen;
+mod warnings;
 
 pub(crate) use evaluator::{Evaluator, Moment, Values};
 pub use fit::{
