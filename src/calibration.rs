@@ -319,7 +319,8 @@ impl CalibratedMachine {
         }
     }
 
-    /// The calibrated machine as a RON text in the machine's own units.
+    /// The calibrated machine as a RON text in the machine's own units. Terms ([`Variation`]) are left out: files have no place for
+    /// them yet, and no command makes a file from a machine that has some.
     pub fn to_ron(&self) -> String {
         let units = self.machine.units();
         let mut form = self.machine.to_form();
