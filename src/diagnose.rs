@@ -4,25 +4,32 @@
 //! geometry explains. Every family of the library at every place competes by the evidence for it; what is found is put into the
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
+mod coarse;
+mod evidence;
 mod finding;
 mod held_out;
 mod leftover;
 mod noise;
 mod score;
 mod search;
+mod shape;
 mod space;
 mod spectrum;
+mod waves;
 
 pub use finding::{Confusable, Diagnosis, Finding, HeldOutPair, RmsByModel, Size, Unexplained, Where};
+
+use std::cell::RefCell;
 
 use crate::effects::{Library, RecordingFacts};
 use crate::error::Result;
 use crate::identify::{Linear, Options, linear};
 use crate::machine::Machine;
 use crate::recording::Recording;
+use coarse::Coarse;
 use noise::{Noise, Whitener};
 use score::Rows;
-use search::{Active, Search};
+use search::Search;
 
 /// What a diagnosis is asked.
 #[derive(Clone, Debug, Default)]
@@ -50,17 +57,17 @@ pub fn diagnose(
     let linear = linear(machine, recordings, request.options, &facts.dead_bands, progress)?;
     let candidates = library.candidates(machine, &facts);
     let runs = noise::runs(&linear);
+    let coarse = Coarse::new(&linear, candidates.all.len());
     let out = noise::outliers(&linear.residual, &runs);
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
 
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
-    let mut left = linear.residual.clone();
-    let mut active: Vec<Active> = Vec::new();
-    let mut result = None;
-    for round in 0..NOISE_ROUNDS {
-        let noise = noise_of(&linear, &left, &runs, &out, &facts);
-        let rows = Rows::new(&linear, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
+    let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
+    let mut active = Vec::new();
+    for round in 1.. {
+        let rows =
+            Rows::new(&linear, &coarse, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
         let search = Search {
             rows: &rows,
             runs: &runs,
@@ -68,18 +75,16 @@ pub fn diagnose(
             candidates: &candidates.all,
             priors: priors.clone(),
             progress,
+            known: RefCell::default(),
         };
-        let before: Vec<usize> = active.iter().map(|a| a.candidate).collect();
-        active = search.run();
-        let same = active.iter().map(|a| a.candidate).eq(before.iter().copied());
-        let settled = round > 0 && same || active.is_empty() || facts_are_smooth(&facts) && round > 0;
-        if settled || round + 1 == NOISE_ROUNDS {
-            result = Some(finding::report(&search, &active, machine, library, &noise));
-            break;
+        active = search.run(&active);
+        let judged = noise_of(&linear, &finding::residual_of(&search, &active), &runs, &out, &facts);
+        if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
+            return Ok(finding::report(&search, &active, machine, library, &noise));
         }
-        left = finding::residual_of(&search, &active);
+        noise = judged;
     }
-    Ok(result.expect("the last round reports"))
+    unreachable!("the last round reports")
 }
 
 fn facts_are_smooth(facts: &RecordingFacts) -> bool {

@@ -154,13 +154,15 @@ pub struct Unexplained {
 }
 
 /// What is left may be this part of what geometry leaves over before nothing counts as explained.
-const TOLERATED: f64 = 0.4;
+const TOLERATED: f64 = 0.2;
+/// The shapes of what was found may make up this part of all.
+const SHAPE: f64 = 0.35;
 /// Structure counts beyond this many standard deviations of chance.
 const CHANCE: f64 = 5.0;
 /// Names of which the data say less than this against the best are listed with it.
 const LISTED: f64 = 0.05;
 /// Logarithm of the odds at which a finding is told.
-const TOLD: f64 = 3.0;
+const TOLD: f64 = 5.0;
 
 /// Residuals with the effects taken away, m and rad.
 pub(super) fn residual_of(search: &Search, active: &[Active]) -> Vec<f64> {
@@ -179,11 +181,13 @@ pub(super) fn report(
     let geometric = search.leftover(&search.base);
     let full = search.beside(active, None);
     let left = search.leftover(&full);
-    let explained: f64 = (search.base.apply(&search.rows.residual).norm_squared()
-        - full.apply(&search.rows.residual).norm_squared())
-    .max(0.0);
-    let share_left = left.energy / (left.energy + explained).max(1e-300);
-    let is_unexplained = left.beyond > CHANCE && (active.is_empty() || share_left > TOLERATED);
+    let names = search.beside_names(active);
+    let energy = |space: &super::space::Space| search.rows.residual.dot(&space.apply(&search.rows.residual));
+    let (by_names, by_shapes) =
+        ((energy(&search.base) - energy(&names)).max(0.0), (energy(&names) - energy(&full)).max(0.0));
+    let total = (by_names + by_shapes + left.energy).max(1e-300);
+    let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
+        || by_shapes > SHAPE * total;
     let noise_of = |angle: bool| {
         let own = search
             .runs
@@ -196,8 +200,8 @@ pub(super) fn report(
     let mut kept = Vec::new();
     let model = Model::new(search, active);
     for (i, effect) in active.iter().enumerate() {
-        let space = search.beside(active, Some(i));
-        let rivals = search.rivals(&space, left.heat);
+        let rivals = search.rivals_of(active, i);
+        let rivals: Vec<Rival> = rivals.iter().map(|r| search.tempered(r, left.heat)).collect();
         let own = rivals.iter().find(|r| r.candidate == effect.candidate);
         let Some(own) = own.filter(|r| r.weight > TOLD) else { continue };
         if is_unexplained {
@@ -246,11 +250,9 @@ pub(super) fn report(
         kept.push(i);
     }
     let unexplained = is_unexplained.then(|| {
-        let space = if active.is_empty() { &search.base } else { &full };
         let at = search
-            .rivals(space, left.heat)
+            .rivals(active)
             .first()
-            .or(None)
             .map_or("measurement".to_string(), |r| search.candidates[r.candidate].place.name(machine));
         let sigma = noise_of(false).or(noise_of(true)).unwrap_or(1.0);
         let rms_m =

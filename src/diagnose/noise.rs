@@ -14,6 +14,13 @@ pub(super) struct Noise {
     pub rho: f64,
 }
 
+impl Noise {
+    /// Whether the difference matters to nothing.
+    pub fn is_close(&self, other: &Noise) -> bool {
+        (self.sigma / other.sigma).ln().abs() < 0.04 && (self.rho - other.rho).abs() < 0.04
+    }
+}
+
 /// Turns rows into independent ones of unit variance.
 #[derive(Clone, Debug)]
 pub(super) struct Whitener {
@@ -30,6 +37,8 @@ const NONE: u32 = u32::MAX;
 const OUTLIER: f64 = 5.0;
 /// No instrument resolves less, m or rad.
 const FINEST: f64 = 1e-10;
+/// Two estimates of the memory that differ by less tell of the same noise.
+const ALIKE: f64 = 0.1;
 /// Longest memory that is told from a drift.
 const MOST_RHO: f64 = 0.97;
 
@@ -107,6 +116,17 @@ fn structure(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], lag: usize) -
     Some(mean)
 }
 
+/// Correlation of neighbouring readings, as they are.
+fn neighbours(residual: &[f64], runs: &[&Vec<usize>], out: &[bool]) -> f64 {
+    let (mut products, mut squares) = (0.0, 0.0);
+    for pair in runs.iter().flat_map(|run| run.windows(2)).filter(|pair| !out[pair[0]] && !out[pair[1]]) {
+        let (a, b) = (residual[pair[0]], residual[pair[1]]);
+        products += a * b;
+        squares += 0.5 * (a * a + b * b);
+    }
+    if squares > 0.0 { products / squares } else { 0.0 }
+}
+
 /// Noise of some runs that share it. `smooth`: whether the path is followed continuously, so that neighbours see the same misfit.
 pub(super) fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smooth: bool) -> Noise {
     let all: Vec<f64> =
@@ -123,7 +143,10 @@ pub(super) fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smo
     let by_two = two / one - 1.0;
     let ratio = (three / one - 1.0).max(0.0);
     let by_three = 0.5 * ((1.0 + 4.0 * ratio).sqrt() - 1.0);
-    let rho = by_two.min(by_three).clamp(0.0, MOST_RHO);
+    let least = by_two.min(by_three);
+    // Where that comes to nearly the same, neighbours as they are say it most exactly.
+    let direct = neighbours(residual, runs, out);
+    let rho = if (direct - least).abs() < ALIKE { direct } else { least }.clamp(0.0, MOST_RHO);
     let rho = if rho < 0.03 { 0.0 } else { rho };
     let sigma2 = if rho == 0.0 { one } else { one / (1.0 - rho) };
     Noise { sigma: sigma2.min(1.05 * total).sqrt().max(FINEST), rho }

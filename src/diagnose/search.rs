@@ -1,10 +1,15 @@
 //! Which effects together explain the recordings best: forward, backward, swaps, each against all candidates.
 
-use nalgebra::DMatrix;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::leftover::{Leftover, measure};
 use super::score::{Field, Rows, Score};
+use super::shape;
 use super::space::Space;
 use crate::effects::Candidate;
 
@@ -16,6 +21,19 @@ pub(super) struct Active {
     pub score: Score,
     /// Whitened columns, each times the size that its coefficient may have.
     pub columns: DMatrix<f64>,
+    /// Its coefficients, in units of the columns.
+    pub solution: DVector<f64>,
+    /// Whitened columns by which its shape may depart from the family's.
+    pub shape: DMatrix<f64>,
+    /// Candidates that might take its place.
+    pub near: Vec<usize>,
+}
+
+impl Active {
+    fn mark(&self) -> Mark {
+        let parameters = self.score.parameters.iter().map(|x| x.to_bits()).collect();
+        (self.candidate, self.score.coefficients, parameters)
+    }
 }
 
 /// A candidate that competes for one finding, and its weight.
@@ -35,11 +53,24 @@ pub(super) struct Search<'a> {
     /// Logarithm of what is expected of each candidate beforehand.
     pub priors: Vec<f64>,
     pub progress: &'a dyn Fn(&str),
+    /// Rivals that are known, by what has been taken in besides.
+    pub known: RefCell<HashMap<(Option<usize>, Vec<Mark>), Rc<Vec<Rival>>>>,
 }
 
+/// What tells an effect that has been taken in: candidate, coefficients and parameters.
+pub(super) type Mark = (usize, usize, Vec<u64>);
+
+/// So many candidates that came next to an effect are compared with it again and again.
+const NEAR: usize = 40;
+/// While it is searched, chance counts as large as the noise says.
+const HEAT: f64 = 1.0;
 /// Candidates with this part of the best one's weight come into question, and at most so many.
 const CLOSE: f64 = 0.6;
 const REFINED: usize = 8;
+/// Rounds over several parameters; parabolas, or halvings of a step where nothing is smooth, for each of them.
+const ROUNDS: usize = 2;
+const PARABOLAS: usize = 3;
+const HALVINGS: usize = 9;
 /// Coefficients of effects that are taken in may be this many times the usual size.
 pub(super) const ROOM: f64 = 4.0;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
@@ -47,20 +78,46 @@ const WORTH: f64 = 0.2;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
 const OWN_SHAPE: f64 = 0.004;
 const OTHER_SHAPE: f64 = 0.001;
+/// A second line of the same family at the same place takes away at least this part of what the first does.
+const REPEATED: f64 = 0.15;
 /// More effects are not looked for.
 const MOST: usize = 5;
 /// Logarithm of the odds at which an effect is taken in.
-const ENTER: f64 = 3.0;
+const ENTER: f64 = 8.0;
 
 impl Search<'_> {
-    /// Evidence of every candidate beside what `space` knows, better first.
-    pub fn rivals(&self, space: &Space, heat: f64) -> Vec<Rival> {
+    /// Evidence of every candidate beside the active effects, better first.
+    pub fn rivals(&self, active: &[Active]) -> Rc<Vec<Rival>> {
+        self.known_or(active, None, None)
+    }
+
+    /// Evidence of those that might take the place of effect `i`, beside all others.
+    pub fn rivals_of(&self, active: &[Active], i: usize) -> Rc<Vec<Rival>> {
+        self.known_or(active, Some(i), Some(&active[i].near))
+    }
+
+    fn known_or(&self, active: &[Active], but: Option<usize>, among: Option<&[usize]>) -> Rc<Vec<Rival>> {
+        let others = active.iter().enumerate().filter(|(i, _)| Some(*i) != but);
+        let mut marks: Vec<Mark> = others.map(|(_, effect)| effect.mark()).collect();
+        marks.sort();
+        let of = but.map(|i| active[i].candidate);
+        let mut known = self.known.borrow_mut();
+        if let Some(known) = known.get(&(None, marks.clone())).or_else(|| known.get(&(of, marks.clone()))) {
+            return known.clone();
+        }
+        let rivals = Rc::new(self.compare(&self.beside(active, but), among));
+        known.insert((among.and(of), marks), rivals.clone());
+        rivals
+    }
+
+    fn compare(&self, space: &Space, among: Option<&[usize]>) -> Vec<Rival> {
         let field = self.rows.field(space.clone());
         // What progress is told is no matter of the threads.
         let (rows, priors, candidates) = (self.rows, &self.priors, self.candidates);
-        let mut rivals: Vec<Rival> = (candidates.par_iter().enumerate())
-            .filter_map(|(i, candidate)| {
-                let score = rows.score(candidate, &field, heat)?;
+        let all: Vec<usize> = among.map_or_else(|| (0..candidates.len()).collect(), <[usize]>::to_vec);
+        let mut rivals: Vec<Rival> = (all.into_par_iter())
+            .filter_map(|i| {
+                let score = rows.screen(i, &candidates[i], &field, HEAT)?;
                 Some(Rival { candidate: i, weight: score.evidence + priors[i], score })
             })
             .collect();
@@ -71,17 +128,28 @@ impl Search<'_> {
         let close = rivals.iter().take_while(|r| r.weight >= near && r.weight > 0.0).count().min(REFINED);
         let refined: Vec<Rival> = rivals[..close]
             .par_iter()
-            .map(|r| refine(rows, &candidates[r.candidate], r, &field, heat))
+            .map(|r| refine(rows, &candidates[r.candidate], r, &field, HEAT))
             .collect();
         rivals.splice(..close, refined);
         rivals.sort_by(better_first);
         rivals
     }
 
+    /// A rival where chance is larger than the noise says.
+    pub fn tempered(&self, rival: &Rival, heat: f64) -> Rival {
+        let prior = self.priors[rival.candidate];
+        Rival { weight: prior + (rival.weight - prior) / heat, ..rival.clone() }
+    }
+
     /// The space beside all active effects but one.
     pub fn beside(&self, active: &[Active], but: Option<usize>) -> Space {
         let others = active.iter().enumerate().filter(|(i, _)| Some(*i) != but);
-        others.fold(self.base.clone(), |space, (_, effect)| space.with(&effect.columns))
+        others.fold(self.base.clone(), |space, (_, effect)| space.with(&effect.columns).with(&effect.shape))
+    }
+
+    /// The space beside the names alone, as if their shapes were the families'.
+    pub fn beside_names(&self, active: &[Active]) -> Space {
+        active.iter().fold(self.base.clone(), |space, effect| space.with(&effect.columns))
     }
 
     /// What is left beside the active effects.
@@ -91,31 +159,61 @@ impl Search<'_> {
     }
 
     /// Takes a rival in, at its best point.
-    pub fn enter(&self, rival: &Rival) -> Option<Active> {
+    pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
         let score = rival.score.clone();
-        let columns = self.rows.of(&self.candidates[rival.candidate], &score.parameters)?;
+        let candidate = &self.candidates[rival.candidate];
+        let columns = self.rows.of(candidate, &score.parameters)?;
         let columns = columns.columns(0, score.coefficients) * ROOM;
-        Some(Active { candidate: rival.candidate, score, columns })
+        let along = space.along(&columns.as_view());
+        let gram = columns.tr_mul(&columns) - along.tr_mul(&along)
+            + DMatrix::identity(score.coefficients, score.coefficients);
+        let solution = gram.cholesky()?.solve(&columns.tr_mul(&space.apply(&self.rows.residual)));
+        let shape = DMatrix::zeros(columns.nrows(), 0);
+        let mut effect =
+            Active { candidate: rival.candidate, score, columns, solution, shape, near: Vec::new() };
+        effect.shape = shape::columns(self.rows, candidate, &effect);
+        Some(effect)
     }
 
     /// Forward with full comparison, and after each step every effect against all others in its place.
     ///
     /// A step counts only if its evidence stands out from the structure that it leaves, and if it takes away more than the shape of
     /// what was found before may be off by.
-    pub fn run(&self) -> Vec<Active> {
+    ///
+    /// `from`: what had been found under another noise.
+    pub fn run(&self, from: &[Active]) -> Vec<Active> {
         let mut active: Vec<Active> = Vec::new();
+        for effect in from {
+            let space = self.beside(&active, None);
+            let (rows, candidate) = (self.rows, &self.candidates[effect.candidate]);
+            let Some(score) =
+                rows.score_at(candidate, &effect.score.parameters, &rows.field(space.clone()), HEAT)
+            else {
+                continue;
+            };
+            let rival = Rival { candidate: effect.candidate, weight: score.evidence, score };
+            active.extend(
+                self.enter(&rival, &space).map(|again| Active { near: effect.near.clone(), ..again }),
+            );
+        }
+        self.swap(&mut active);
         while active.len() < MOST {
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let space = self.beside(&active, None);
-            let rivals = self.rivals(&space, 1.0);
-            let Some(best) = rivals.first().filter(|r| r.weight > ENTER) else { break };
+            let rivals = self.rivals(&active);
+            let Some(best) =
+                rivals.iter().take_while(|r| r.weight > ENTER).find(|r| !self.repeats(r, &active))
+            else {
+                break;
+            };
             let structure = self.leftover(&space).energy;
             if best.score.gain < self.shape_error(best, &active) || 2.0 * best.score.gain < WORTH * structure
             {
                 break;
             }
-            let Some(entered) = self.enter(best) else { break };
-            active.push(entered);
+            let Some(entered) = self.enter(best, &space) else { break };
+            let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
+            active.push(Active { near, ..entered });
             let left = self.leftover(&self.beside(&active, None));
             if best.weight < ENTER * left.heat {
                 active.pop();
@@ -126,6 +224,14 @@ impl Search<'_> {
             }
         }
         active
+    }
+
+    /// Whether it has the name and place of what was found already and is little beside it: that is its shape.
+    fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
+        let of = |candidate: usize| (&self.candidates[candidate].effect, self.candidates[candidate].place);
+        active
+            .iter()
+            .any(|a| of(a.candidate) == of(rival.candidate) && rival.score.gain < REPEATED * a.score.gain)
     }
 
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place.
@@ -143,8 +249,7 @@ impl Search<'_> {
             let mut changed = false;
             let mut i = 0;
             while i < active.len() {
-                let space = self.beside(active, Some(i));
-                let rivals = self.rivals(&space, 1.0);
+                let rivals = self.rivals_of(active, i);
                 match rivals.first().filter(|r| r.weight > ENTER) {
                     None => {
                         active.remove(i);
@@ -152,9 +257,13 @@ impl Search<'_> {
                         continue;
                     }
                     Some(best) => {
-                        if let Some(entered) = self.enter(best) {
-                            changed |= best.candidate != active[i].candidate;
-                            active[i] = entered;
+                        let better = best.candidate != active[i].candidate
+                            || best.score.gain > active[i].score.gain + 0.5;
+                        if let Some(entered) =
+                            self.enter(best, &self.beside(active, Some(i))).filter(|_| better)
+                        {
+                            changed = true;
+                            active[i] = Active { near: std::mem::take(&mut active[i].near), ..entered };
                         }
                     }
                 }
@@ -170,28 +279,41 @@ impl Search<'_> {
 /// Moves the parameters between the points of the grid to where the evidence is greatest; the evidence over the grid grows alike.
 fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
     let at = |parameters: &[f64]| rows.score_at(candidate, parameters, field, heat);
-    let mut best = rival.score.clone();
-    let start = best.at_best;
-    for round in 0..2 {
-        for (p, parameter) in candidate.parameters.iter().enumerate().filter(|(_, p)| p.smooth) {
-            let mut step = 0.5f64.powi(2 * round) * spacing(candidate, p, best.parameters[p]);
-            for _ in 0..5 {
-                step *= 0.5;
-                for sign in [-1.0, 1.0] {
-                    let mut moved = best.parameters.clone();
-                    moved[p] += sign * step;
-                    if moved[p] < parameter.range.0 || moved[p] > parameter.range.1 {
-                        continue;
-                    }
-                    if let Some(score) = at(&moved).filter(|s| s.at_best > best.at_best) {
-                        best = Score { evidence: best.evidence, ..score };
-                        break;
-                    }
+    let start = rival.score.at_best;
+    let Some(here) = at(&rival.score.parameters) else { return rival.clone() };
+    let mut best = Score { evidence: rival.score.evidence, ..here };
+    let free: Vec<usize> =
+        (0..candidate.parameters.len()).filter(|p| !candidate.parameters[*p].whole).collect();
+    let mut steps: Vec<f64> = free.iter().map(|p| 0.5 * spacing(candidate, *p, &best.parameters)).collect();
+    for _ in 0..if free.len() > 1 { ROUNDS } else { 1 } {
+        for (p, step) in free.iter().zip(&mut steps) {
+            let (low, high) = candidate.parameters[*p].range;
+            let moved = |to: f64, best: &mut Score| {
+                let mut parameters = best.parameters.clone();
+                parameters[*p] = to.clamp(low, high);
+                let score = at(&parameters)?;
+                let evidence = score.at_best;
+                if evidence > best.at_best {
+                    *best = Score { evidence: best.evidence, ..score };
+                }
+                Some(evidence)
+            };
+            // Parabolas through three points; where there is no summit, the step goes on or shrinks.
+            for _ in 0..if candidate.parameters[*p].smooth { PARABOLAS } else { HALVINGS } {
+                let (x, here) = (best.parameters[*p], best.at_best);
+                let (Some(below), Some(above)) = (moved(x - *step, &mut best), moved(x + *step, &mut best))
+                else {
+                    break;
+                };
+                let bend = below + above - 2.0 * here;
+                if candidate.parameters[*p].smooth && bend < 0.0 {
+                    let shift = (0.5 * *step * (below - above) / bend).clamp(-2.0 * *step, 2.0 * *step);
+                    moved(x + shift, &mut best);
+                    *step = (0.3 * *step).max(0.5 * shift.abs());
+                } else if best.parameters[*p] == x {
+                    *step *= 0.5;
                 }
             }
-        }
-        if candidate.parameters.len() < 2 {
-            break;
         }
     }
     let grown = best.at_best - start;
@@ -199,10 +321,13 @@ fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat
     Rival { candidate: rival.candidate, weight: rival.weight + grown, score: best }
 }
 
-/// Distance to the next point of the grid.
-fn spacing(candidate: &Candidate, p: usize, value: f64) -> f64 {
-    let apart =
-        candidate.grid.iter().map(|point| (point[p] - value).abs()).filter(|d| *d > 1e-12 * value.abs());
-    let near = apart.fold(f64::INFINITY, f64::min);
-    if near.is_finite() { near } else { 0.0 }
+/// Distance to the next point of the grid with the same other parameters, or with any.
+fn spacing(candidate: &Candidate, p: usize, at: &[f64]) -> f64 {
+    let near = |alike: bool| {
+        let others = |point: &[f64]| (0..at.len()).all(|k| k == p || point[k] == at[k]);
+        let points = candidate.grid.iter().filter(|point| !alike || others(point));
+        let apart = points.map(|point| (point[p] - at[p]).abs()).filter(|d| *d > 1e-12 * at[p].abs());
+        apart.fold(f64::INFINITY, f64::min)
+    };
+    [near(true), near(false)].into_iter().find(|d| d.is_finite()).unwrap_or(0.0)
 }

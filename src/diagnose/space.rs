@@ -1,6 +1,6 @@
 //! What is known already: geometry and the effects found so far, marginalised out of everything that is judged, `docs/diagnosis.md` (62).
 
-use nalgebra::{DMatrix, DVector, SVD};
+use nalgebra::{DMatrix, DMatrixView, DVector, SVD};
 
 /// The precision of whitened rows after columns with Gaussian priors have been marginalised: `M = I - W Wᵀ`.
 #[derive(Clone)]
@@ -68,7 +68,7 @@ impl Space {
     }
 
     /// `WᵀC`: what of columns lies in the space.
-    pub fn along(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn along(&self, c: &DMatrixView<f64>) -> DMatrix<f64> {
         &self.wt * c
     }
 }

@@ -104,6 +104,8 @@ pub struct Parameter {
     pub range: (f64, f64),
     /// Whether the features' derivatives by it say how they change. Else (whole numbers, moments of a step) only the grid does.
     pub smooth: bool,
+    /// Whether only whole numbers come into question.
+    pub whole: bool,
 }
 
 /// A family at one place: columns of a regression, `docs/effects.md` (40).
@@ -320,6 +322,7 @@ fn candidate(
             name: form.name.clone(),
             dimension: form.dimension(own_kind).unwrap_or(Dimension::ONE),
             range: *range,
+            whole: whole(i),
             smooth: !whole(i) && features.iter().all(|f| f.is_smooth_in(i)),
         })
         .collect();

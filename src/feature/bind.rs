@@ -180,6 +180,11 @@ impl Feature {
         (self.memories == 0).then(|| (cosine, Feature::of((**inner).clone())))
     }
 
+    /// Whether its value depends on the samples before.
+    pub fn remembers(&self) -> bool {
+        self.memories > 0
+    }
+
     /// Whether its derivative by parameter `index` says how it changes: not where that parameter stands inside a step or sign.
     pub fn is_smooth_in(&self, index: usize) -> bool {
         smooth(&self.node, index)

@@ -101,7 +101,9 @@ impl Feature {
     /// Its values over whole recordings, stretches in their order, one after the other.
     pub fn over(&self, stretches: &[Samples], parameters: &[f64]) -> Vec<f64> {
         let mut memory = Memory::new(self);
-        stretches.iter().flat_map(|samples| self.column(samples, parameters, 1.0, &mut memory)).collect()
+        let mut all = Vec::new();
+        stretches.iter().for_each(|samples| all.extend(self.column(samples, parameters, 1.0, &mut memory)));
+        all
     }
 
     /// As [`Feature::over`], with the derivative by each parameter from dual numbers.
@@ -317,18 +319,23 @@ fn clip<S: Scalar>(x: S) -> S {
     x.select_below(0.0, x.lift(0.0), x)
 }
 
+/// Exponential; far down, where it is nothing to anything, it stays what it is: numbers near underflow are slow.
+fn vanishing<S: Scalar>(x: S) -> S {
+    x.select_below(-200.0, x.lift(-200.0), x).exp()
+}
+
 #[inline(always)]
 fn function<S: Scalar>(f: Function, x: S) -> S {
     let number = |value: f64| x.lift(value);
     match f {
         Function::Sin => x.sin_cos().0,
         Function::Cos => x.sin_cos().1,
-        Function::Exp => x.exp(),
+        Function::Exp => vanishing(x),
         Function::Abs => x.select_below(0.0, -x, x),
         Function::Sign => x.select_below(0.0, number(-1.0), (-x).select_below(0.0, number(1.0), number(0.0))),
         Function::Positive => clip(x),
         Function::Step => x.select_below(0.0, number(0.0), number(1.0)),
-        Function::Bump => (x * x).scale(-0.5).exp(),
+        Function::Bump => vanishing((x * x).scale(-0.5)),
     }
 }
 

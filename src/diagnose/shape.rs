@@ -1,0 +1,215 @@
+//! The shape of an effect as it may depart from the family's: the same motion, as another function of what the effect depends on.
+//!
+//! No play is quite a step and no worm quite a sine. What is left at the place of an effect because of that is taken for its shape and
+//! not for a second effect; and where the shape would have to be most of it, the name is wrong, `docs/diagnosis.md` (66).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::score::Rows;
+use super::search::Active;
+use crate::effects::{Candidate, Slot};
+use crate::feature::{Feature, Samples};
+use crate::lie::Twist;
+
+/// A column of the shape may have this part of the effect's amplitude.
+const PART: f64 = 0.3;
+/// Orders of curves along travel and time.
+const CURVE: usize = 12;
+/// Orders of what multiplies the effect's own features.
+const WANDER: usize = 3;
+/// Travel over which something decays after a reversal, as parts of the range of travel.
+const DECAYS: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
+/// Effects with more directions keep the mixture of them that was found.
+const MOST_DIRECTIONS: usize = 3;
+
+/// Whitened columns of the shape of an effect, each times what its coefficient may be.
+pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
+    let n = rows.residual.len();
+    let amplitude = (&active.columns * &active.solution).norm();
+    let curves = curves(rows, candidate, &active.score.parameters);
+    let answers = answers(rows, candidate, active);
+    let mut columns = Vec::new();
+    let mut white = vec![0.0; n];
+    for answer in &answers {
+        for curve in &curves {
+            let column: Vec<f64> =
+                answer.iter().zip(&rows.linear.sample).map(|(a, sample)| a * curve[*sample]).collect();
+            rows.whitener.apply(&column, &mut white);
+            let length = white.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if length > 0.0 && length.is_finite() {
+                columns.push(DVector::from_column_slice(&white) * (PART * amplitude / length));
+            }
+        }
+    }
+    if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) }
+}
+
+/// Answers of the readings to the directions of the effect, or to the mixture of them that was found.
+fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
+    let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();
+    let used = &candidate.coefficients[..active.score.coefficients];
+    for part in used.iter().flat_map(|c| &c.parts) {
+        let is_known = distinct.iter().any(|(slot, d)| *slot == part.slot && *d == part.direction);
+        if !is_known {
+            distinct.push((part.slot, part.direction));
+        }
+    }
+    if distinct.len() <= MOST_DIRECTIONS {
+        return distinct.iter().map(|(slot, d)| rows.answer(*slot, *d).to_vec()).collect();
+    }
+    let units = rows.units(candidate, &active.score.parameters);
+    let mut mixture = vec![0.0; rows.residual.len()];
+    for ((coefficient, unit), x) in used.iter().zip(&units).zip(active.solution.iter()) {
+        for part in &coefficient.parts {
+            let answer = rows.answer(part.slot, part.direction);
+            mixture.iter_mut().zip(answer.iter()).for_each(|(sum, a)| *sum += unit * x * a);
+        }
+    }
+    vec![mixture]
+}
+
+/// Other functions of what the effect's features depend on, at every sample.
+fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64>> {
+    let stretches = &rows.linear.samples;
+    let features = &candidate.features;
+    let any = |test: &dyn Fn(&Feature) -> bool| features.iter().any(test);
+    let own: Vec<Vec<f64>> = features.iter().map(|f| f.over(stretches, parameters)).collect();
+    let joints: Vec<usize> = {
+        let mut all: Vec<usize> = features.iter().flat_map(Feature::joints).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    };
+    let mut curves: Vec<Vec<f64>> = Vec::new();
+    let (history, rates, gravity, time) = (
+        any(&Feature::needs_history),
+        any(&Feature::needs_rates),
+        any(&Feature::needs_gravity),
+        any(&Feature::needs_time),
+    );
+    // Overtones of a wave.
+    for pair in features.chunks(2) {
+        let Some((_, phase)) = pair[0].wave() else { continue };
+        let phase = phase.over(stretches, parameters);
+        for overtone in [2.0, 3.0, 4.0, 5.0] {
+            curves.push(phase.iter().map(|p| (overtone * p).sin()).collect());
+            curves.push(phase.iter().map(|p| (overtone * p).cos()).collect());
+        }
+    }
+    let is_wave = !curves.is_empty();
+    if joints.len() <= 2 {
+        for j in &joints {
+            let position = rescaled(&column(stretches, *j, |c| &c.position));
+            if rates {
+                let (v, a) =
+                    (column(stretches, *j, |c| &c.velocity), column(stretches, *j, |c| &c.acceleration));
+                let (v, a) = (by_largest(&v), by_largest(&a));
+                curves.extend([
+                    power(&v, 2),
+                    power(&v, 3),
+                    power(&a, 2),
+                    power(&a, 3),
+                    absolute(&v),
+                    absolute(&a),
+                ]);
+                curves.extend([v, a]);
+            }
+            if gravity {
+                let g = by_largest(&column(stretches, *j, |c| &c.gravity));
+                let load = by_largest(&column(stretches, *j, |c| &c.load));
+                curves.extend([
+                    power(&g, 2),
+                    power(&g, 3),
+                    absolute(&g),
+                    power(&load, 2),
+                    power(&load, 3),
+                    load,
+                    g,
+                ]);
+            }
+            if history {
+                let direction = column(stretches, *j, |c| &c.direction);
+                let since = column(stretches, *j, |c| &c.since_reversal);
+                let range = extent(&column(stretches, *j, |c| &c.position));
+                curves.extend((0..=4).map(|n| product(&direction, &chebyshev(n, &position))));
+                // In a recording in which it stands still nobody knows on which side it lies.
+                let mut first = 0;
+                for stretch in stretches {
+                    let own = first..first + stretch.len;
+                    if stretch.len > 0 && direction[own.clone()].iter().all(|d| *d == 0.0) {
+                        curves.push(
+                            (0..direction.len()).map(|k| if own.contains(&k) { 1.0 } else { 0.0 }).collect(),
+                        );
+                    }
+                    first = own.end;
+                }
+                for part in DECAYS {
+                    let decay: Vec<f64> =
+                        since.iter().map(|s| (-s / (part * range)).max(-200.0).exp()).collect();
+                    curves.push(product(&direction, &decay));
+                }
+            } else if !rates && !is_wave {
+                curves.extend((1..=CURVE).map(|n| chebyshev(n, &position)));
+            }
+            // Its strength may differ along the way.
+            if !is_wave || history {
+                for f in &own {
+                    curves.extend((1..=WANDER).map(|n| product(f, &chebyshev(n, &position))));
+                }
+            }
+        }
+    }
+    if time && !is_wave {
+        let clock: Vec<f64> = stretches.iter().flat_map(|s| s.time.clone().unwrap_or_default()).collect();
+        let clock = rescaled(&clock);
+        if clock.len() == rows.linear.lines.len() {
+            curves.extend((1..=CURVE).map(|n| chebyshev(n, &clock)));
+            for f in &own {
+                curves.extend((1..=WANDER).map(|n| product(f, &chebyshev(n, &clock))));
+            }
+        }
+    }
+    curves
+}
+
+fn column(
+    stretches: &[Samples],
+    j: usize,
+    pick: impl Fn(&crate::feature::JointSamples) -> &Vec<f64>,
+) -> Vec<f64> {
+    let one = |s: &Samples| s.joints[j].as_ref().map(|c| pick(c).clone()).unwrap_or_default();
+    stretches.iter().flat_map(one).collect()
+}
+
+fn extent(x: &[f64]) -> f64 {
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    (high - low).max(1e-12)
+}
+
+/// From -1 to 1 over what there is.
+fn rescaled(x: &[f64]) -> Vec<f64> {
+    let low = x.iter().copied().fold(f64::INFINITY, f64::min);
+    let range = extent(x);
+    x.iter().map(|x| 2.0 * (x - low) / range - 1.0).collect()
+}
+
+fn by_largest(x: &[f64]) -> Vec<f64> {
+    let most = x.iter().fold(1e-12f64, |m, x| m.max(x.abs()));
+    x.iter().map(|x| x / most).collect()
+}
+
+fn power(x: &[f64], n: i32) -> Vec<f64> {
+    x.iter().map(|x| x.powi(n)).collect()
+}
+
+fn absolute(x: &[f64]) -> Vec<f64> {
+    x.iter().map(|x| x.abs()).collect()
+}
+
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
+
+fn chebyshev(n: usize, x: &[f64]) -> Vec<f64> {
+    x.iter().map(|x| (n as f64 * x.clamp(-1.0, 1.0).acos()).cos()).collect()
+}

@@ -1,0 +1,63 @@
+//! Candidates that are sines and cosines of one phase, over their whole grid at once.
+
+use super::score::{Field, Rows};
+use super::spectrum::Spectrum;
+use crate::effects::Candidate;
+
+impl Rows<'_> {
+    /// Energy that a pair of sine and cosine of one phase takes away, at every point of the grid, as if it had nothing in common with
+    /// the space; `None` if the features are no such pair, or the phase is no multiple of one column.
+    pub(super) fn harmonics(&self, candidate: &Candidate, field: &Field) -> Option<Vec<f64>> {
+        let samples = &self.linear.samples;
+        let (first, last) = (candidate.grid.first()?, candidate.grid.last()?);
+        let dual = self.whitener.transposed(field.left.as_slice());
+        let mut gains = vec![0.0; candidate.grid.len()];
+        if candidate.features.len() % 2 == 1 || candidate.features.is_empty() {
+            return None;
+        }
+        for (pair, features) in candidate.features.chunks_exact(2).enumerate() {
+            let ((_, phase), (_, other)) = (features[0].wave()?, features[1].wave()?);
+            if phase != other {
+                return None;
+            }
+            let x = phase.over(samples, first);
+            let reference = (0..x.len()).max_by(|a, b| x[*a].abs().total_cmp(&x[*b].abs()))?;
+            let at_last = phase.over(samples, last);
+            let factor = at_last[reference] / x[reference];
+            let straight = |k: usize| (at_last[k] - factor * x[k]).abs() <= 1e-9 * at_last[reference].abs();
+            if !(factor.is_finite() && (0..x.len()).all(straight)) {
+                return None;
+            }
+            // The phase at one sample tells the factor at every point.
+            let spans = &self.linear.spans;
+            let s = spans.iter().position(|span| (span.samples.0..span.samples.1).contains(&reference))?;
+            let one = [samples[s].chosen(&[reference - spans[s].samples.0])];
+            let factors: Vec<f64> = (candidate.grid.iter())
+                .map(|point| phase.over(&one, point).first().map_or(f64::NAN, |phase| phase / x[reference]))
+                .collect();
+            let largest = factors.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+            for coefficient in candidate.coefficients.iter().filter(|c| c.order == 2 * pair) {
+                let mut weights = vec![0.0; x.len()];
+                let mut energy = 0.0;
+                let mut white = vec![0.0; dual.len()];
+                for part in &coefficient.parts {
+                    let answer = self.answer(part.slot, part.direction);
+                    answer.iter().zip(&dual).enumerate().for_each(|(row, (a, d))| {
+                        weights[self.linear.sample[row]] += a * d;
+                    });
+                    self.whitener.plain(&answer, &mut white);
+                    energy += white.iter().map(|x| x * x).sum::<f64>();
+                }
+                if energy <= 0.0 {
+                    continue;
+                }
+                let spectrum = Spectrum::new(&x, &weights, largest)?;
+                factors
+                    .iter()
+                    .zip(&mut gains)
+                    .for_each(|(f, gain)| *gain += spectrum.power(*f) / (0.5 * energy));
+            }
+        }
+        Some(gains)
+    }
+}
