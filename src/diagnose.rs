@@ -7,6 +7,7 @@
 mod finding;
 mod held_out;
 mod leftover;
+mod model;
 mod noise;
 mod score;
 mod search;

@@ -5,8 +5,8 @@ use serde::Serialize;
 
 use super::held_out::{self, Model};
 use super::noise::Noise;
-use super::search::{Active, Rival, Search};
-use crate::effects::{Identified, Library};
+use super::search::{Active, ROOM, Rival, Search};
+use crate::effects::{Identified, Library, StoredEffect};
 use crate::identify::BeforeAfter;
 use crate::machine::Machine;
 
@@ -41,6 +41,17 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
+    /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
+    #[serde(skip)]
+    pub(super) named: Vec<Named>,
+}
+
+/// An effect that was found, as it is put into the model.
+#[derive(Clone, Debug)]
+pub(super) struct Named {
+    pub effect: StoredEffect,
+    /// Standard deviation of the prior of each of its terms, in the coefficient's unit.
+    pub scales: Vec<f64>,
 }
 
 /// RMS under three models.
@@ -192,7 +203,7 @@ pub(super) fn report(
             .find(|(run, _)| run.first().is_some_and(|r| linear.angle[*r] == angle));
         own.map(|(_, noise)| noise.sigma)
     };
-    let mut findings = Vec::new();
+    let (mut findings, mut named) = (Vec::new(), Vec::new());
     let mut kept = Vec::new();
     let model = Model::new(search, active);
     for (i, effect) in active.iter().enumerate() {
@@ -218,6 +229,10 @@ pub(super) fn report(
         };
         let sizes = identified.sizes(&linear.samples);
         let explanation = identified.sentence(machine, &sizes);
+        named.push(Named {
+            effect: identified.stored(machine, &sizes),
+            scales: search.rows.units(candidate, &effect.score.parameters).iter().map(|u| ROOM * u).collect(),
+        });
         let confusable_with = rivals
             .iter()
             .filter(|r| r.candidate != effect.candidate && (r.weight - own.weight).exp() > LISTED)
@@ -280,6 +295,7 @@ pub(super) fn report(
         held_out_rms_rad: None,
         findings,
         unexplained,
+        named,
     }
 }
 
