@@ -32,7 +32,7 @@ pub(crate) use linear::{Linear, Span, linear};
 pub use loss::Loss;
 pub use solve::{Solver, Stop};
 pub(crate) use source::{Known, Source, Sources, channel};
-pub(crate) use stretch::{Beginning, Memories, Stretch, stretches};
+pub(crate) use stretch::{Beginning, Memories, Stretch, by_dyad, stretches};
 
 use serde::Serialize;
 

@@ -74,7 +74,7 @@ impl CalibratedMachine {
     /// `because` sees an effect and its features.
     pub(crate) fn variation_without(
         &self,
-        because: impl Fn(&StoredEffect, &[&Feature]) -> Option<String>,
+        mut because: impl FnMut(&StoredEffect, &[&Feature]) -> Option<String>,
     ) -> (Variation, Vec<LeftOut>) {
         let mut variation = self.variation.clone();
         let mut left_out = Vec::new();

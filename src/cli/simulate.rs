@@ -177,6 +177,12 @@ fn summary(
     if plant.varies_with_direction() {
         text.push_str("deviations that change with directions of travel, as the machine file says\n");
     }
+    for effect in plant.effects() {
+        let _ = writeln!(text, "{} at {}: {}", effect.effect, effect.at, effect.says);
+    }
+    for left in plant.left_out() {
+        let _ = writeln!(text, "note: {} at {} is left out: {}", left.effect, left.at, left.because);
+    }
     if plant.varies_with_position() {
         text.push_str("joints with play\n");
         if args.truth.is_some() {
