@@ -5,6 +5,7 @@
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
 mod finding;
+mod folds;
 mod held_out;
 mod leftover;
 mod model;
@@ -14,7 +15,9 @@ mod search;
 mod space;
 mod spectrum;
 
-pub use finding::{Confusable, Diagnosis, Finding, HeldOutPair, RmsByModel, Size, Unexplained, Where};
+pub use finding::{
+    Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size, Unexplained, Where,
+};
 
 use crate::effects::{Library, RecordingFacts};
 use crate::error::Result;

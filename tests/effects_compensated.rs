@@ -11,7 +11,7 @@ use kincal::effects::{Identified, Library, RecordingFacts, StoredEffect};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
-use kincal::simulate::{At, Instrument, Plant, Sample, random_deviations, recording};
+use kincal::simulate::{At, Faults, Instrument, Plant, Sample, random_deviations, recording};
 use kincal::{CalibratedMachine, Chain, Machine};
 
 /// Commands (y, x, z) along which all axes of the mill go to and fro from rest, m.
@@ -132,6 +132,31 @@ fn a_simulated_recording_of_a_machine_with_effects_is_what_its_file_predicts() {
 }
 
 #[test]
+fn effects_of_a_faults_file_are_those_of_a_calibrated_file() {
+    let machine = common::machine("xyz_mill");
+    let truth = erroneous(&machine, Vec::new());
+    let text = truth.to_ron();
+    let from = text.find("        effects: [").expect("effects");
+    let to = from + text[from..].find("\n        ],").expect("their end");
+    let faults = format!("Faults(units: (length: um, angle: urad),\n{}\n],\n)", &text[from..to]);
+    let read = |text: &str| Faults::parse("faults.ron", text, &machine);
+    let plain = CalibratedMachine::nominal(machine.clone()).with_deviations(truth.deviations().to_vec());
+    let plant = Plant::new(&plain).with_faults(&read(&faults).unwrap_or_else(|e| panic!("{e}")));
+    assert_eq!(plant.truth(&plain).effects(), truth.effects());
+    let commands = path(300, [1.3, 2.2, 2.9]);
+    let again = plant.truth(&plain);
+    assert_eq!(
+        predict(&again, &measured(&truth, &commands, 0.0), None).unwrap_or_else(|e| panic!("{e}")).rms_m,
+        predict(&truth, &measured(&truth, &commands, 0.0), None).unwrap_or_else(|e| panic!("{e}")).rms_m
+    );
+    let error = read(&faults.replace("Before(\"x\")", "Before(\"q\")")).expect_err("no such frame");
+    assert!(
+        error.to_string().contains("no frame \"q\"") && error.to_string().contains("faults.ron:"),
+        "{error}"
+    );
+}
+
+#[test]
 fn a_program_for_a_machine_with_play_and_a_cyclic_error_is_corrected_by_its_own_file_to_95_percent() {
     let machine = common::machine("xyz_mill");
     let truth = erroneous(&machine, Vec::new());
@@ -200,6 +225,13 @@ fn a_mill_is_measured_diagnosed_and_its_program_corrected_to_95_percent() {
     let rms = predict(&again, &recordings[0], None).unwrap_or_else(|e| panic!("{e}")).rms_m.expect("lengths");
     let told = diagnosis.rms_m.expect("lengths").r#final;
     assert!((rms - told).abs() < 1e-12, "{rms:e} {told:e}");
+    // Left-out stretches show the effects as well: what is left there is the noise, 0.2 um in each of three readings.
+    let held = diagnosis.held_out_rms_m.expect("lengths");
+    assert!(held.geometric > 5e-6 && (2e-7..5e-7).contains(&held.r#final), "{held:?}");
+    for finding in &diagnosis.findings {
+        let pair = finding.held_out_rms_m.expect("lengths");
+        assert!(pair.before > 5.0 * pair.after && pair.after == held.r#final, "{pair:?}");
+    }
     let meant = path(600, [1.9, 2.6, 3.3]);
     let (sent, _) = compensated(&again, &meant);
     let (before, after) = (error(&truth, &meant, &meant), error(&truth, &sent, &meant));

@@ -80,6 +80,14 @@ fn render(diagnosis: &Diagnosis) -> String {
     }
     for finding in &diagnosis.findings {
         let _ = writeln!(text, "\n{} (probability {:.2})", finding.explanation, finding.probability);
+        if let Some(held) = &finding.held_out_rms_m {
+            let _ = writeln!(
+                text,
+                "  on stretches left out of the fit: {} without it, {} with it",
+                length(held.before),
+                length(held.after)
+            );
+        }
         for other in &finding.confusable_with {
             let _ = writeln!(
                 text,

@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         write_whole(path, |out| kincal::simulate::write_program(plant.machine(), &runs, out))?;
     }
     if let Some(path) = &args.truth {
-        let truth = machine.clone().with_deviations(plant.constant().to_vec());
+        let truth = plant.truth(&machine);
         write_whole(path, |out| {
             // Watched: an error here is told of the output.
             let _ = out.write_all(truth.to_ron().as_bytes());

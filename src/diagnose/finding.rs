@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
 use super::search::{Active, ROOM, Rival, Search};
@@ -283,7 +284,7 @@ pub(super) fn report(
     let told: Vec<Active> = kept.iter().map(|i| active[*i].clone()).collect();
     let left_over = Model::new(search, &told).residual(search, &told);
     let recordings = linear.spans.iter().map(|s| s.label.clone()).collect();
-    Diagnosis {
+    let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
         recordings,
         samples: linear.lines.len() as u64,
@@ -296,7 +297,9 @@ pub(super) fn report(
         findings,
         unexplained,
         named,
-    }
+    };
+    folds::fill(search, &told, &mut diagnosis);
+    diagnosis
 }
 
 fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {
@@ -305,7 +308,7 @@ fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {
 }
 
 /// Root mean square over samples of the norm of residual lengths or angles.
-fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
+pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
     let linear = search.rows.linear;
     let rows = || (0..residual.len()).filter(|row| linear.angle[*row] == angle);
     let mut samples: Vec<usize> = rows().map(|row| linear.sample[row]).collect();

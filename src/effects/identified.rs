@@ -321,6 +321,7 @@ pub struct StoredEffect {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub with: Option<String>,
     /// What it is, in a sentence.
+    #[serde(default)]
     pub says: String,
     /// The kind of measurement whose readings it changes, where it belongs to the instrument and not to the machine.
     #[serde(default, skip_serializing_if = "Option::is_none")]

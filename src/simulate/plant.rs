@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::course::Sample;
 use super::faults::{Faults, Width};
 use super::random_deviations;
-use crate::calibration::{CalibratedMachine, LeftOut};
+use crate::calibration::{CalibratedMachine, LeftOut, terms};
 use crate::chain::Chain;
 use crate::effects::StoredEffect;
 use crate::error::Result;
@@ -179,6 +179,15 @@ impl Plant {
             }
         }
         self.backlash.extend(faults.backlash.iter().cloned());
+        for effect in &faults.effects {
+            // The reader of faults has bound it once.
+            let Ok(own) = terms(&self.machine, effect) else { continue };
+            for (value, term) in own {
+                self.by_direction.varying.terms.push(term);
+                self.by_direction.coefficients.push(value);
+            }
+            self.effects.push(effect.clone());
+        }
         self
     }
 
@@ -223,7 +232,21 @@ impl Plant {
         self.by_direction.varying.directions.is_some()
     }
 
-    /// Named effects of the calibrated file that are simulated.
+    /// The calibrated machine that this plant was made from, with all that a file can hold of it: not the play of
+    /// [`Faults::backlash`].
+    pub fn truth(&self, machine: &CalibratedMachine) -> CalibratedMachine {
+        let plain = machine.clone().with_deviations(self.constant.clone());
+        let own = machine.effects().len() - self.left_out.len();
+        let more = self.effects.get(own..).unwrap_or_default().to_vec();
+        if more.is_empty() {
+            return plain;
+        }
+        let mut bands = self.by_direction.dead_bands.clone();
+        bands.resize(self.machine.commands().len(), 0.0);
+        plain.clone().with_effects(more, bands).unwrap_or(plain)
+    }
+
+    /// Named effects that are simulated: those of the calibrated file, then those of faults.
     pub fn effects(&self) -> &[StoredEffect] {
         &self.effects
     }
