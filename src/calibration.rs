@@ -12,11 +12,16 @@ use crate::error::Result;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine, MachineFault, MachineForm, Placement, at_path, in_unit, to_text};
 
+use crate::effects::StoredEffect;
 use crate::rms::Rms;
 use crate::variation::Variation;
-use pieces::PiecesForm;
+use pieces::{AxisForm, PiecesForm};
 
+mod named;
 mod pieces;
+
+pub use named::LeftOut;
+pub(crate) use named::terms;
 
 pub(crate) type Triple = (f64, f64, f64);
 
@@ -43,6 +48,12 @@ pub(crate) struct CalibrationForm {
     seen: Vec<SeenForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pieces: Option<PiecesForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    dead_bands: Vec<AxisForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    clock: Option<(f64, f64)>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    effects: Vec<StoredEffect>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     unseen: Option<Vec<Vec<DeviationForm>>>,
 }
@@ -110,6 +121,10 @@ pub struct CalibratedMachine {
     samples: u64,
     rms: Rms,
     variation: Variation,
+    /// Effects whose terms stand in `variation`, in their order.
+    effects: Vec<StoredEffect>,
+    /// First and last time of the recordings on their clock, s.
+    clock: Option<(f64, f64)>,
 }
 
 impl CalibratedMachine {
@@ -128,6 +143,8 @@ impl CalibratedMachine {
             samples: 0,
             rms: Rms::default(),
             variation: Variation::default(),
+            effects: Vec::new(),
+            clock: None,
         }
     }
 
@@ -302,6 +319,7 @@ impl CalibratedMachine {
         if let Some(pieces) = &form.pieces {
             self.variation = pieces.read(&self.machine)?;
         }
+        self.read_effects(form)?;
         self.samples = form.samples;
         self.rms = Rms {
             m: form.rms_length.map(|x| units.length.to_si(x)),
@@ -319,8 +337,8 @@ impl CalibratedMachine {
         }
     }
 
-    /// The calibrated machine as a RON text in the machine's own units. Terms ([`Variation`]) are left out: files have no place for
-    /// them yet, and no command makes a file from a machine that has some.
+    /// The calibrated machine as a RON text in the machine's own units; its effects are in SI. Terms ([`Variation`]) that belong to no
+    /// named effect ([`CalibratedMachine::effects`]) are left out.
     pub fn to_ron(&self) -> String {
         let units = self.machine.units();
         let mut form = self.machine.to_form();
@@ -365,6 +383,9 @@ impl CalibratedMachine {
                 .collect(),
             seen: seen.collect(),
             pieces: PiecesForm::of(&self.machine, &self.variation),
+            dead_bands: self.dead_band_forms(),
+            clock: self.clock,
+            effects: self.effects.clone(),
             unseen,
         });
         to_text(&form)

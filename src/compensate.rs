@@ -32,6 +32,7 @@ mod arc;
 mod calls;
 mod control;
 mod correct;
+mod effects;
 mod fault;
 mod follower;
 mod frame;
@@ -88,7 +89,7 @@ pub(crate) fn named(name: &str) -> String {
 ///
 /// # Errors
 /// [`Error::Compensate`] with the line that cannot be corrected, [`Error::Nc`], [`Error::File`]; `out` then
-/// holds a part. [`Error::Undetermined`] where the machine's deviations depend on features of the path.
+/// holds a part.
 pub fn compensate(
     calibrated: &CalibratedMachine,
     path: impl AsRef<Path>,
@@ -101,7 +102,7 @@ pub fn compensate(
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
         Program::new(path, BufReader::new(file))
     };
-    let mut model = model::of_machine(calibrated)?;
+    let mut model = model::of_machine(calibrated);
     run(calibrated.machine(), &mut *model, &open, setup, options, out)
 }
 
@@ -116,7 +117,7 @@ pub fn compensate_text(
     setup: &Setup,
     options: &Options,
 ) -> Result<(String, Report)> {
-    let mut model = model::of_machine(calibrated)?;
+    let mut model = model::of_machine(calibrated);
     let machine = calibrated.machine();
     let (bytes, report) = compensate_with(machine, &mut *model, file, text.as_ref(), setup, options)?;
     Ok((String::from_utf8_lossy(&bytes).into_owned(), report))

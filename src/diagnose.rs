@@ -7,8 +7,10 @@
 mod coarse;
 mod evidence;
 mod finding;
+mod folds;
 mod held_out;
 mod leftover;
+mod model;
 mod noise;
 mod score;
 mod search;
@@ -17,7 +19,9 @@ mod space;
 mod spectrum;
 mod waves;
 
-pub use finding::{Confusable, Diagnosis, Finding, HeldOutPair, RmsByModel, Size, Unexplained, Where};
+pub use finding::{
+    Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size, Unexplained, Where,
+};
 
 use std::cell::RefCell;
 

@@ -17,6 +17,7 @@ mod evaluate;
 mod expression;
 mod formula;
 mod samples;
+mod walk;
 
 pub use bind::{Binding, Feature, Unbound};
 pub use check::{DimensionFault, Scope, dimension_of};
@@ -24,3 +25,4 @@ pub use dimension::Dimension;
 pub use evaluate::Memory;
 pub use expression::Expression;
 pub use samples::{Follow, FollowOptions, JointSamples, Samples, first_directions, samples_of};
+pub(crate) use walk::Walk;

@@ -32,7 +32,7 @@ pub(crate) use linear::{Linear, Span, linear};
 pub use loss::Loss;
 pub use solve::{Solver, Stop};
 pub(crate) use source::{Known, Source, Sources, channel};
-pub(crate) use stretch::{Beginning, Memories, Stretch, stretches};
+pub(crate) use stretch::{Beginning, Memories, Stretch, by_dyad, stretches};
 
 use serde::Serialize;
 
@@ -197,7 +197,7 @@ pub fn fit_setup(
     recordings: &[Recording],
     loss: Loss,
 ) -> Result<CalibratedMachine> {
-    let (machine, variation) = (calibrated.machine(), calibrated.variation());
+    let (machine, (variation, _)) = (calibrated.machine(), calibrated.variation_in(recordings));
     let varying = &variation.varying;
     let dead_bands: Vec<_> = variation.dead_bands.iter().map(|band| Some(*band)).collect();
     let sources = Sources::new(recordings, machine, varying, &dead_bands, &|_| {})?;

@@ -100,7 +100,7 @@ pub mod simulate;
 pub mod units;
 pub mod variation;
 
-pub use calibration::CalibratedMachine;
+pub use calibration::{CalibratedMachine, LeftOut};
 pub use chain::{Chain, Sweep};
 pub use error::{Error, Place, Result};
 pub use machine::Machine;

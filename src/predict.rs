@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde::Serialize;
 
-use crate::calibration::CalibratedMachine;
+use crate::calibration::{CalibratedMachine, LeftOut};
 use crate::chain::Chain;
 use crate::error::{Error, Result};
 use crate::identify::{Beginning, Evaluator, Memories, Moment, Stretch, Values, channel, stretches};
@@ -50,6 +50,9 @@ pub struct Prediction {
     /// Samples with a pattern of directions of travel that the calibration has not seen; they are predicted from what single
     /// directions have shown.
     pub unseen_directions: u64,
+    /// Effects of the calibrated file that this recording cannot use.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
     /// The names of those patterns, such as `AFCR`; `0` is an axis that never moves.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unseen_pieces: Vec<String>,
@@ -100,7 +103,7 @@ pub fn predict(
     let sensor = Sensor::of(header);
     let state = sensor_state(calibrated, header, &sensor)?;
     let (previous_from_w, dh) = frame_of_w(calibrated, header, &sensor)?;
-    let variation = calibrated.variation();
+    let (variation, left_out) = calibrated.variation_in(std::slice::from_ref(recording));
     let values = Values {
         directions: variation.varying.directions.as_ref(),
         parts: &variation.parts,
@@ -184,6 +187,7 @@ pub fn predict(
         mean_abs_rad,
         extrapolated_samples: extrapolated,
         unseen_directions: unseen.iter().sum(),
+        left_out,
         unseen_pieces: match &variation.varying.directions {
             Some(directions) => {
                 let pieces = unseen.iter().enumerate().filter(|(_, n)| **n > 0);

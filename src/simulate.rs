@@ -159,9 +159,6 @@ pub fn random_commands(machine: &Machine, count: usize, seed: u64) -> Vec<Vec<f6
 /// A recording of `machine` in the form that kincal reads, in m and rad; `extra_header` goes in as it is, one line each.
 ///
 /// The short way for tests: the header says nothing of the instrument but its kind, and samples follow each other by 10 ms.
-///
-/// # Panics
-/// If the machine's deviations depend on features of the path.
 pub fn recording(
     machine: &CalibratedMachine,
     instrument: &Instrument,
@@ -178,7 +175,7 @@ pub fn recording(
         at: At::Pose(k + 1),
     };
     let first = plant.first_directions(commands.iter().enumerate().map(at).map(Ok));
-    let mut state = plant.start(first.unwrap_or_else(|e| panic!("{e}")));
+    let mut state = plant.start(first.unwrap_or_default());
     let mut rng = StdRng::seed_from_u64(seed);
     // The points are the caller's to tell.
     let silent = Instrument::new(instrument.sensor.clone(), 0.0, 0.0);

@@ -18,9 +18,9 @@ pub(crate) struct PiecesForm {
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename = "axis", deny_unknown_fields)]
-struct AxisForm {
-    joint: String,
-    dead_band: f64,
+pub(crate) struct AxisForm {
+    pub joint: String,
+    pub dead_band: f64,
 }
 
 /// Deviations that change sign with the product of the directions of these axes.
@@ -116,16 +116,16 @@ impl PiecesForm {
     }
 }
 
-fn command(machine: &Machine, joint: &str) -> Option<usize> {
+pub(super) fn command(machine: &Machine, joint: &str) -> Option<usize> {
     machine.commands().iter().position(|c| c == joint)
 }
 
-fn unknown(machine: &Machine, path: &str, joint: &str) -> (String, MachineFault) {
+pub(super) fn unknown(machine: &Machine, path: &str, joint: &str) -> (String, MachineFault) {
     let what = format!("\"{joint}\" is none of the axes {}", machine.commands().join(", "));
     (format!("{path}.joint"), MachineFault::BadPieces { what })
 }
 
-fn unit(machine: &Machine, command: usize) -> Unit {
+pub(super) fn unit(machine: &Machine, command: usize) -> Unit {
     match machine.command_joint(command).kind {
         JointKind::Prismatic => machine.units().length,
         JointKind::Revolute => machine.units().angle,

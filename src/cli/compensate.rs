@@ -204,6 +204,12 @@ fn render(r: &Report, program: &str) -> String {
 
 fn notes(r: &Report) -> String {
     let mut text = String::new();
+    for left in &r.left_out {
+        let _ = writeln!(text, "note: {} at {} is not corrected: {}", left.effect, left.at, left.because);
+    }
+    for held in &r.held {
+        let _ = writeln!(text, "note: {} at {}: {}", held.effect, held.at, held.because);
+    }
     if r.reversals.count > 0 {
         let _ = writeln!(
             text,

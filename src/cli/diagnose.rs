@@ -9,7 +9,7 @@ use kincal::effects::Library;
 use kincal::recording::Recording;
 
 use super::Common;
-use super::output::{Outcome, check_outputs, length, open_machine, open_recording};
+use super::output::{Outcome, check_outputs, length, open_machine, open_recording, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -25,12 +25,15 @@ pub(crate) struct Args {
     /// Leave a family out
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
+    /// Where to write the calibrated machine with what was found
+    #[arg(short, long, value_name = "CALIBRATED.ron")]
+    output: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.common.json_file()], &args.recordings)?;
+    check_outputs(&[args.output.as_deref(), args.common.json_file()], &args.recordings)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings: Vec<Recording> =
         args.recordings.iter().map(|path| open_recording(path, &machine)).collect::<Result<_, _>>()?;
@@ -42,10 +45,31 @@ pub(crate) fn run(args: &Args) -> Outcome {
         library = library.without(name)?;
     }
     let progress = args.common.progress();
-    let found = diagnose(&machine, &recordings, &library, &Request::default(), &|text| progress.say(text));
+    let request = Request::default();
+    let found = diagnose(&machine, &recordings, &library, &request, &|text| progress.say(text)).and_then(
+        |mut found| {
+            let wanted = args.output.is_some() || !found.findings.is_empty();
+            let model = match wanted {
+                true => {
+                    Some(found.model(&machine, &recordings, request.options, &|text| progress.say(text))?)
+                }
+                false => None,
+            };
+            Ok((found, model))
+        },
+    );
     drop(progress);
-    let diagnosis = found?;
-    args.common.say(&render(&diagnosis));
+    let (diagnosis, model) = found?;
+    let mut text = render(&diagnosis);
+    if let (Some(path), Some(model)) = (&args.output, model) {
+        write_whole(path, |out| {
+            // Watched: an error here is told of the output.
+            let _ = out.write_all(model.to_ron().as_bytes());
+            Ok(())
+        })?;
+        let _ = writeln!(text, "written to {}", path.display());
+    }
+    args.common.say(&text);
     args.common.write_json(&diagnosis)
 }
 
@@ -56,6 +80,14 @@ fn render(diagnosis: &Diagnosis) -> String {
     }
     for finding in &diagnosis.findings {
         let _ = writeln!(text, "\n{} (probability {:.2})", finding.explanation, finding.probability);
+        if let Some(held) = &finding.held_out_rms_m {
+            let _ = writeln!(
+                text,
+                "  on stretches left out of the fit: {} without it, {} with it",
+                length(held.before),
+                length(held.after)
+            );
+        }
         for other in &finding.confusable_with {
             let _ = writeln!(
                 text,

@@ -79,6 +79,9 @@ fn render(p: &Prediction, name: &str) -> String {
             count(p.extrapolated_samples, "sample", "samples")
         ));
     }
+    for left in &p.left_out {
+        text.push_str(&format!("note: {} at {} is left out: {}\n", left.effect, left.at, left.because));
+    }
     if p.unseen_directions > 0 {
         text.push_str(&format!(
             "note: at {} the axes travel in a pattern of directions that the calibration has not seen ({}); it is predicted from what single directions have shown\n",

@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         write_whole(path, |out| kincal::simulate::write_program(plant.machine(), &runs, out))?;
     }
     if let Some(path) = &args.truth {
-        let truth = machine.clone().with_deviations(plant.constant().to_vec());
+        let truth = plant.truth(&machine);
         write_whole(path, |out| {
             // Watched: an error here is told of the output.
             let _ = out.write_all(truth.to_ron().as_bytes());
@@ -176,6 +176,12 @@ fn summary(
     }
     if plant.varies_with_direction() {
         text.push_str("deviations that change with directions of travel, as the machine file says\n");
+    }
+    for effect in plant.effects() {
+        let _ = writeln!(text, "{} at {}: {}", effect.effect, effect.at, effect.says);
+    }
+    for left in plant.left_out() {
+        let _ = writeln!(text, "note: {} at {} is left out: {}", left.effect, left.at, left.because);
     }
     if plant.varies_with_position() {
         text.push_str("joints with play\n");

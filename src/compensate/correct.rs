@@ -45,7 +45,7 @@ impl Follower<'_> {
     /// What the model says is wrong where the program means `meant` and the joints are sent to `sent`.
     pub fn error(&self, sent: &[f64], meant: &[f64]) -> Left {
         let goal = self.goal(meant);
-        Left::between(self.model.chain().w_from_t(sent) * goal.t_from_tip, goal.w_from_tip)
+        Left::between(self.model.chain_at(meant).w_from_t(sent) * goal.t_from_tip, goal.w_from_tip)
     }
 
     /// Tells the model where the program goes; where that changes the piece, the step of the correction is
@@ -63,7 +63,7 @@ impl Follower<'_> {
         if piece != self.model.piece() {
             let free = self.free();
             let goal = self.goal(&meant);
-            let again = self.inverse.solve(self.model.chain(), &goal, &meant, &free);
+            let again = self.inverse.solve(&self.model.chain_at(&meant), &goal, &meant, &free);
             let at = |q: &[f64]| self.control.nominal.w_from_t(q) * goal.t_from_tip;
             let step = Left::between(at(&sent), at(&again.commands));
             self.report.largest_reversal_m.take(step.m, line);
@@ -83,7 +83,8 @@ impl Follower<'_> {
     ) -> Correction {
         let free = self.free();
         let goal = self.goal(q);
-        let solution = self.inverse.solve(self.model.chain(), &goal, q, &free);
+        let chain = self.model.chain_at(q).into_owned();
+        let solution = self.inverse.solve(&chain, &goal, q, &free);
         let all_free = free.iter().all(|f| *f);
         match solution.outcome {
             Outcome::OutOfTravel { command, by } => {
@@ -122,7 +123,7 @@ impl Follower<'_> {
             if let Some(there) = self.control.joints(&rounded, &exact) {
                 let slides: Vec<bool> = (0..free.len()).map(|c| free[c] && self.is_prismatic(c)).collect();
                 if slides.iter().filter(|s| **s).count() == 3 {
-                    let again = self.slides.solve(self.model.chain(), &goal, &there, &slides);
+                    let again = self.slides.solve(&chain, &goal, &there, &slides);
                     exact = again.commands;
                 } else {
                     exact = there;

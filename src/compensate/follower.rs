@@ -416,6 +416,7 @@ impl<'a> Follower<'a> {
         let unseen = self.unseen_report();
         let mut report = self.report;
         report.unseen = unseen;
+        (report.left_out, report.held) = (self.model.left_out().to_vec(), self.model.held().to_vec());
         let never = self.control.axes.iter().zip(&self.status);
         report.never_programmed = never
             .filter(|(axis, status)| axis.command.is_some() && **status == Status::Never)

@@ -1,8 +1,10 @@
 //! What compensation asks of a calibrated machine: the kinematics that hold behind each commanded position.
 
-use crate::calibration::CalibratedMachine;
+use std::borrow::Cow;
+
+use super::effects::Effects;
+use crate::calibration::{CalibratedMachine, LeftOut};
 use crate::chain::Chain;
-use crate::error::{Error, Result};
 use crate::lie::Twist;
 use crate::motion::Tracker;
 use crate::variation::Directions;
@@ -17,6 +19,22 @@ pub trait Model {
 
     /// The chain that holds at the position last told.
     fn chain(&self) -> &Chain<f64>;
+
+    /// The chain that holds where the machine passes `commands` in the move that ends at the position last told.
+    fn chain_at(&self, commands: &[f64]) -> Cow<'_, Chain<f64>> {
+        let _ = commands;
+        Cow::Borrowed(self.chain())
+    }
+
+    /// Effects of the calibration that are not corrected, and why.
+    fn left_out(&self) -> &[LeftOut] {
+        &[]
+    }
+
+    /// Effects that change with time, and at which of their states they are corrected.
+    fn held(&self) -> &[LeftOut] {
+        &[]
+    }
 
     /// Which set of deviations [`Model::chain`] comes from; where it changes, the correction steps.
     fn piece(&self) -> usize;
@@ -41,21 +59,17 @@ pub trait Model {
     }
 }
 
-/// The model of a calibrated machine.
-///
-/// # Errors
-/// [`Error::Undetermined`] where deviations depend on features of the path: a program is not followed in time.
-pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Result<Box<dyn Model + '_>> {
+/// The model of a calibrated machine. Effects that a program says nothing of (time, speed, the instrument) are left out or
+/// held, [`Model::left_out`].
+pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Box<dyn Model + '_> {
     let varying = &calibrated.variation().varying;
     if !varying.terms.is_empty() {
-        let what = format!("{}: its deviations depend on features of the path", calibrated.machine().name());
-        let mend = "calibrate with constant deviations or with pieces by direction, then compensate";
-        return Err(Error::Undetermined { what, mend: mend.into() });
+        return Box::new(Effects::new(calibrated));
     }
-    Ok(match &varying.directions {
+    match &varying.directions {
         Some(directions) => Box::new(Pieces::new(calibrated, directions)),
         None => Box::new(Constant { calibrated, chain: calibrated.chain() }),
-    })
+    }
 }
 
 /// One set of deviations for each pattern of directions of travel.
@@ -89,7 +103,7 @@ impl<'a> Pieces<'a> {
 }
 
 /// Nothing has moved yet.
-fn at_rest(calibrated: &CalibratedMachine) -> Tracker {
+pub(super) fn at_rest(calibrated: &CalibratedMachine) -> Tracker {
     let bands = calibrated.variation().dead_bands.clone();
     let first = vec![0; bands.len()];
     Tracker::new(bands, first)
@@ -133,7 +147,7 @@ impl Model for Pieces<'_> {
     }
 }
 
-fn is_zero(deviations: &[Twist<f64>]) -> bool {
+pub(super) fn is_zero(deviations: &[Twist<f64>]) -> bool {
     deviations.iter().all(|dh| dh.to_array().iter().all(|x| *x == 0.0))
 }
 

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::calibration::LeftOut;
+
 /// Most lines that a list names; the count beside it goes on.
 pub const MOST_LISTED: usize = 50;
 
@@ -165,6 +167,12 @@ pub struct Report {
     /// Addresses that the program never names; their joints were taken where they stand at the start, and
     /// left there.
     pub never_programmed: Vec<String>,
+    /// Effects of the calibration that a program says nothing of: they are not corrected.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<LeftOut>,
+    /// Effects that change with time, and the state in which they are corrected.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub held: Vec<LeftOut>,
     /// What the calibration has not seen of the errors of tip and tool axis at the ends of these moves;
     /// `None` where that is not known.
     pub unseen: Option<Unseen>,

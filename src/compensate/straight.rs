@@ -118,7 +118,7 @@ impl Follower<'_> {
         let corrected = |s: f64| -> Option<(Position, Position)> {
             let program = at(s);
             let q = self.control.joints(&program, &self.meant.q)?;
-            let sent = self.inverse.solve(self.model.chain(), &self.goal(&q), &q, &free).commands;
+            let sent = self.inverse.solve(&self.model.chain_at(&q), &self.goal(&q), &q, &free).commands;
             let written = Position { program: self.control.program(&sent, &program), q: sent };
             Some((Position { q, program }, written))
         };
@@ -219,7 +219,7 @@ impl Follower<'_> {
             let program = arc.at(f64::from(k) / 8.0);
             let q = self.joints(block, &program)?;
             let goal = self.goal(&q);
-            let sent = self.inverse.solve(self.model.chain(), &goal, &q, &self.free()).commands;
+            let sent = self.inverse.solve(&self.model.chain_at(&q), &goal, &q, &self.free()).commands;
             let written = self.control.program(&sent, &program);
             for i in 0..program.len() {
                 let half = 0.5 * 10f64.powi(-(self.places(i) as i32));

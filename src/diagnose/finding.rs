@@ -3,10 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
-use super::search::{Active, Rival, Search};
-use crate::effects::{Identified, Library};
+use super::search::{Active, ROOM, Rival, Search};
+use crate::effects::{Identified, Library, StoredEffect};
 use crate::identify::BeforeAfter;
 use crate::machine::Machine;
 
@@ -41,6 +42,17 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
+    /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
+    #[serde(skip)]
+    pub(super) named: Vec<Named>,
+}
+
+/// An effect that was found, as it is put into the model.
+#[derive(Clone, Debug)]
+pub(super) struct Named {
+    pub effect: StoredEffect,
+    /// Standard deviation of the prior of each of its terms, in the coefficient's unit.
+    pub scales: Vec<f64>,
 }
 
 /// RMS under three models.
@@ -196,7 +208,7 @@ pub(super) fn report(
             .find(|(run, _)| run.first().is_some_and(|r| linear.angle[*r] == angle));
         own.map(|(_, noise)| noise.sigma)
     };
-    let mut findings = Vec::new();
+    let (mut findings, mut named) = (Vec::new(), Vec::new());
     let mut kept = Vec::new();
     let model = Model::new(search, active);
     for (i, effect) in active.iter().enumerate() {
@@ -222,6 +234,10 @@ pub(super) fn report(
         };
         let sizes = identified.sizes(&linear.samples);
         let explanation = identified.sentence(machine, &sizes);
+        named.push(Named {
+            effect: identified.stored(machine, &sizes),
+            scales: search.rows.units(candidate, &effect.score.parameters).iter().map(|u| ROOM * u).collect(),
+        });
         let confusable_with = rivals
             .iter()
             .filter(|r| r.candidate != effect.candidate && (r.weight - own.weight).exp() > LISTED)
@@ -270,7 +286,7 @@ pub(super) fn report(
     let told: Vec<Active> = kept.iter().map(|i| active[*i].clone()).collect();
     let left_over = Model::new(search, &told).residual(search, &told);
     let recordings = linear.spans.iter().map(|s| s.label.clone()).collect();
-    Diagnosis {
+    let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
         recordings,
         samples: linear.lines.len() as u64,
@@ -282,7 +298,10 @@ pub(super) fn report(
         held_out_rms_rad: None,
         findings,
         unexplained,
-    }
+        named,
+    };
+    folds::fill(search, &told, &mut diagnosis);
+    diagnosis
 }
 
 fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {
@@ -291,7 +310,7 @@ fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {
 }
 
 /// Root mean square over samples of the norm of residual lengths or angles.
-fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
+pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
     let linear = search.rows.linear;
     let rows = || (0..residual.len()).filter(|row| linear.angle[*row] == angle);
     let mut samples: Vec<usize> = rows().map(|row| linear.sample[row]).collect();

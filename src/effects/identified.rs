@@ -276,8 +276,11 @@ impl Identified<'_> {
         let triple = |v: Vec3<f64>| (v.0[0], v.0[1], v.0[2]);
         let frame = |j: usize| machine.dyads()[j].frame.clone();
         let terms = (self.candidate.coefficients.iter().zip(&self.coefficients))
-            .map(|(coefficient, value)| StoredTerm {
+            .enumerate()
+            .map(|(i, (coefficient, value))| StoredTerm {
                 value: *value,
+                unit: coefficient.dimension.to_string(),
+                std_error: self.covariance.as_ref().map(|c| c[i][i].max(0.0).sqrt()),
                 parts: (coefficient.parts.iter())
                     .map(|part| StoredPart {
                         slot: match part.slot {
@@ -299,6 +302,7 @@ impl Identified<'_> {
             at: self.candidate.place.name(machine),
             with: self.candidate.place.partner(machine),
             says: self.sentence(machine, sizes),
+            instrument: None,
             sizes: sizes.to_vec(),
             terms,
         }
@@ -317,7 +321,11 @@ pub struct StoredEffect {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub with: Option<String>,
     /// What it is, in a sentence.
+    #[serde(default)]
     pub says: String,
+    /// The kind of measurement whose readings it changes, where it belongs to the instrument and not to the machine.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub instrument: Option<String>,
     /// Its sizes.
     #[serde(default)]
     pub sizes: Vec<SizeOf>,
@@ -331,6 +339,12 @@ pub struct StoredEffect {
 pub struct StoredTerm {
     /// The coefficient, SI.
     pub value: f64,
+    /// Its unit, such as `rad` or `m/s`.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub unit: String,
+    /// Its standard uncertainty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub std_error: Option<f64>,
     /// Its parts.
     pub parts: Vec<StoredPart>,
 }
@@ -375,7 +389,7 @@ impl StoredEffect {
     /// Coefficients with their parts on a machine.
     ///
     /// # Errors
-    /// A frame or joint that the machine does not have.
+    /// A frame or joint that the machine does not have; a number that is none.
     pub fn bind(&self, machine: &Machine) -> Result<Vec<(f64, Vec<BoundPart>)>, Unbound> {
         let travel = vec![None; machine.dyads().len()];
         let binding =
@@ -389,11 +403,22 @@ impl StoredEffect {
                 StoredSlot::Reading => Slot::Reading,
             };
             let ((a, b, c), (d, e, f)) = (part.v, part.w);
-            let direction = Twist::from_array([a, b, c, d, e, f]);
+            let direction = [a, b, c, d, e, f];
+            let endless = |e: &Expression| match e {
+                Expression::Number(x) | Expression::Value(x, _) | Expression::TimeSince(x) => !x.is_finite(),
+                Expression::Between(_, from, to) => !(to > from && (to - from).is_finite()),
+                _ => false,
+            };
+            if part.feature.any(&endless) || direction.iter().any(|x| !x.is_finite()) {
+                return Err(Unbound::Number);
+            }
+            let direction = Twist::from_array(direction);
             Ok(BoundPart { slot, direction, feature: Feature::bind(&part.feature, &binding)? })
         };
-        let term =
-            |term: &StoredTerm| Ok((term.value, term.parts.iter().map(part).collect::<Result<_, _>>()?));
+        let term = |term: &StoredTerm| match term.value.is_finite() {
+            true => Ok((term.value, term.parts.iter().map(part).collect::<Result<_, _>>()?)),
+            false => Err(Unbound::Number),
+        };
         self.terms.iter().map(term).collect()
     }
 

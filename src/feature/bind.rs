@@ -108,6 +108,9 @@ pub enum Unbound {
     /// A parameter that is not declared.
     #[error("parameter \"{0}\" is not declared")]
     Parameter(String),
+    /// A number that is not finite, or a range from more to less.
+    #[error("a number in it is not finite, or a range ends before it begins")]
+    Number,
     /// A unit that is none.
     #[error("\"{0}\" is no unit")]
     Unit(String),
@@ -158,6 +161,17 @@ impl Feature {
         let mut node = other.node;
         renumber(&mut node, self.memories);
         Feature { node: Node::Product(vec![self.node, node]), memories }
+    }
+
+    /// The feature times a number.
+    pub fn scaled(&self, factor: f64) -> Self {
+        if factor == 1.0 {
+            return self.clone();
+        }
+        Feature {
+            node: Node::Product(vec![Node::Number(factor), self.node.clone()]),
+            memories: self.memories,
+        }
     }
 
     /// The feature with its parameters replaced by numbers, in SI.

@@ -206,7 +206,12 @@ impl<S: Scalar> Pass<'_, S> {
             }
             Node::Between(e, from, to) => {
                 let (middle, scale) = (0.5 * (from + to), 2.0 / (to - from));
-                self.evaluate(e).map(|x| x.offset(-middle).scale(scale))
+                // Beyond the range a curve stays at its end: nothing was seen there, and polynomials run away.
+                let within = |x: S| {
+                    let x = x.offset(1.0).select_below(0.0, x.lift(-1.0), x);
+                    (-x).offset(1.0).select_below(0.0, x.lift(1.0), x)
+                };
+                self.evaluate(e).map(|x| within(x.offset(-middle).scale(scale)))
             }
             Node::Play { joint, width, memory } => {
                 let width = self.evaluate(width);

@@ -14,7 +14,7 @@ pub enum Expression {
 
     /// Displacement of the own joint, m or rad.
     Position,
-    /// Where the own joint stands within the travel seen, from -1 to 1.
+    /// Where the own joint stands within the travel seen, from -1 to 1; beyond it, at its ends.
     Stroke,
     /// Direction of travel or approach of the own joint, -1 or 1 (0 if it never moves).
     Direction,
@@ -73,7 +73,7 @@ pub enum Expression {
     Bump(Box<Expression>),
     /// Chebyshev polynomial of this order of a pure number, meant for -1 to 1.
     Chebyshev(u8, Box<Expression>),
-    /// From -1 to 1 while the expression runs from one number to another, in SI.
+    /// From -1 to 1 while the expression runs from one number to another, in SI; beyond them it stays at -1 and 1.
     Between(Box<Expression>, f64, f64),
 
     /// Deviation of what hangs behind the own joint with play of this width (total).

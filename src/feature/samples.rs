@@ -141,18 +141,24 @@ pub struct Follow<'a, I> {
 }
 
 /// Histories of all joints, `docs/effects.md` (43).
-struct History {
+#[derive(Clone)]
+pub(super) struct History {
     /// Dyad, drive, dead band (m or rad), direction of the first motion.
-    joints: Vec<(usize, Drive, f64, i8)>,
+    pub(super) joints: Vec<(usize, Drive, f64, i8)>,
     axes: Vec<Option<Axis>>,
     /// Whether the joint has turned round yet.
     turned: Vec<bool>,
-    travelled: Vec<f64>,
-    last: Vec<f64>,
+    pub(super) travelled: Vec<f64>,
+    pub(super) last: Vec<f64>,
 }
 
 impl History {
-    fn new(machine: &Machine, dead_bands: &[f64], first: &[i8]) -> Self {
+    /// Where joint `i` last turned round, m or rad; `None` before its first reversal.
+    pub(super) fn turned_at(&self, i: usize) -> Option<f64> {
+        self.axes[i].filter(|_| self.turned[i]).map(|axis| axis.turned_at)
+    }
+
+    pub(super) fn new(machine: &Machine, dead_bands: &[f64], first: &[i8]) -> Self {
         let joints: Vec<_> = (machine.joints())
             .map(|(j, _)| {
                 (j, machine.drive(j).expect("every joint has a drive").clone(), dead_bands[j], first[j])
@@ -168,12 +174,12 @@ impl History {
         }
     }
 
-    fn advance(&mut self, chunk: &Chunk, k: usize, displacements: &[f64]) {
+    pub(super) fn advance(&mut self, stated: impl Fn(usize) -> Option<i8>, displacements: &[f64]) {
         for (i, (j, drive, band, _)) in self.joints.iter().enumerate() {
             let q = displacements[*j];
             // A column of directions speaks of one command; of a joint that follows several it says nothing.
             let stated = match drive.terms.as_slice() {
-                [(c, factor)] => stated(chunk, *c, k).map(|d| if *factor < 0.0 { -d } else { d }),
+                [(c, factor)] => stated(*c).map(|d| if *factor < 0.0 { -d } else { d }),
                 _ => None,
             };
             let axis = self.axes[i].get_or_insert_with(|| Axis::at(q));
@@ -187,18 +193,15 @@ impl History {
         }
     }
 
-    fn direction(&self, i: usize) -> i8 {
+    pub(super) fn direction(&self, i: usize) -> i8 {
         match &self.axes[i] {
             Some(axis) if axis.direction != 0 => axis.direction,
             _ => self.joints[i].3,
         }
     }
 
-    fn since_reversal(&self, i: usize, q: f64) -> f64 {
-        match &self.axes[i] {
-            Some(axis) if self.turned[i] => (q - axis.turned_at).abs(),
-            _ => FAR,
-        }
+    pub(super) fn since_reversal(&self, i: usize, q: f64) -> f64 {
+        self.turned_at(i).map_or(FAR, |turned_at| (q - turned_at).abs())
     }
 }
 
@@ -214,7 +217,7 @@ pub fn first_directions(
     for chunk in chunks {
         let chunk = chunk?;
         for (k, q) in chunk.commands.chunks_exact(commands).enumerate() {
-            history.advance(&chunk, k, &machine.displacements(q));
+            history.advance(|c| stated(&chunk, c, k), &machine.displacements(q));
             for (i, (j, ..)) in history.joints.iter().enumerate() {
                 if first[*j] == 0 {
                     first[*j] = history.direction(i);
@@ -246,15 +249,16 @@ pub struct FollowOptions {
 }
 
 /// The part of [`Follow`] that knows no chunks.
-struct Weights {
-    chain: Chain<f64>,
+#[derive(Clone)]
+pub(super) struct Weights {
+    pub(super) chain: Chain<f64>,
     g_b: Vec3<f64>,
     /// Mass and its place behind the joint, by dyad; stated and substitute.
     masses: Vec<Vec<(usize, f64, Vec3<f64>)>>,
 }
 
 impl Weights {
-    fn new(machine: &Machine, gravity_w: Option<Vec3<f64>>) -> Self {
+    pub(super) fn new(machine: &Machine, gravity_w: Option<Vec3<f64>>) -> Self {
         let chain = Chain::nominal(machine);
         let home = chain.sweep(&vec![0.0; machine.commands().len()]);
         let g_b = gravity_w.map_or(machine.gravity_b(), |g_w| home.b_from_w().rotation * g_w);
@@ -275,7 +279,13 @@ impl Weights {
     }
 
     /// Torque or force on the joint of dyad `j`: of the masses beyond, and of 1 kg at the end of the branch.
-    fn on(&self, machine: &Machine, sweep: &Sweep<f64>, displacements: &[f64], j: usize) -> (f64, f64) {
+    pub(super) fn on(
+        &self,
+        machine: &Machine,
+        sweep: &Sweep<f64>,
+        displacements: &[f64],
+        j: usize,
+    ) -> (f64, f64) {
         let Some(joint) = &machine.dyads()[j].joint else { return (0.0, 0.0) };
         let b_from_j = sweep.b_from_frame(j);
         let n_b = b_from_j.rotation * joint.axis;
@@ -337,7 +347,7 @@ impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
         let mut moved = Vec::with_capacity(chunk.len);
         for (k, q) in chunk.commands.chunks_exact(commands).enumerate() {
             let displacements = machine.displacements(q);
-            self.history.advance(chunk, k, &displacements);
+            self.history.advance(|c| stated(chunk, c, k), &displacements);
             for (i, (j, ..)) in self.history.joints.iter().enumerate() {
                 let Some(columns) = &mut joints[*j] else { continue };
                 columns.position.push(displacements[*j]);

@@ -153,6 +153,12 @@ pub enum MachineFault {
         /// What is wrong.
         what: String,
     },
+    /// An effect of a calibration that does not fit the machine.
+    #[error("{what}")]
+    BadEffect {
+        /// What is wrong.
+        what: String,
+    },
 }
 
 impl MachineFault {
@@ -198,6 +204,7 @@ impl MachineFault {
             NoJoint => "a machine needs a joint: (frame: \"x\", joint: Prismatic(axis: \"x\"))".into(),
             UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
             BadPieces { .. } => "write the pieces as `calibrate --directions` does".into(),
+            BadEffect { .. } => "write the effects as `diagnose -o` does, or take this one out".into(),
         }
     }
 }

@@ -53,6 +53,10 @@ pub(crate) fn to_text(form: &MachineForm) -> String {
 fn one_entry_a_line(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 256);
     for line in text.split_inclusive('\n') {
+        if let Some(effects) = line.strip_prefix(EFFECTS) {
+            out.push_str(&format!("{EFFECTS}{}", one_field_a_line(effects)));
+            continue;
+        }
         let list = line.starts_with("        ").then(|| line.split_once(": [(")).flatten();
         match list.and_then(|(field, rest)| Some((field, rest.trim_end().strip_suffix(")],")?))) {
             Some((field, entries))
@@ -62,6 +66,63 @@ fn one_entry_a_line(text: &str) -> String {
                 out.push_str(&format!("{field}: [\n            ({entries}),\n        ],\n"));
             }
             _ => out.push_str(line),
+        }
+    }
+    out
+}
+
+/// How the line of a calibration's effects begins.
+const EFFECTS: &str = "        effects: [";
+
+/// Effects on one line, laid out: each field on its own, and each entry of the lists among them.
+fn one_field_a_line(effects: &str) -> String {
+    let mut out = String::with_capacity(2 * effects.len());
+    let (mut depth, mut quoted, mut escaped) = (1, false, false);
+    let indent = |depth: usize| format!("\n{:width$}", "", width = 8 + 4 * depth);
+    let mut letters = effects.chars().peekable();
+    while let Some(letter) = letters.next() {
+        if quoted {
+            out.push(letter);
+            (quoted, escaped) = (escaped || letter != '"', !escaped && letter == '\\');
+            continue;
+        }
+        match letter {
+            '(' | '[' => {
+                if depth == 1 {
+                    out.push_str(&indent(depth));
+                }
+                out.push(letter);
+                if let Some(end) = letters.next_if(|next| matches!(next, ')' | ']')) {
+                    out.push(end);
+                    continue;
+                }
+                depth += 1;
+                if depth <= 3 {
+                    out.push_str(&indent(depth));
+                }
+            }
+            ')' | ']' => {
+                if (2..=3).contains(&depth) {
+                    out.push(',');
+                }
+                if depth <= 3 {
+                    out.push_str(&indent(depth - 1));
+                }
+                depth = depth.saturating_sub(1);
+                out.push(letter);
+            }
+            ',' => {
+                out.push(letter);
+                if (2..=3).contains(&depth) && letters.next_if_eq(&' ').is_some() {
+                    out.push_str(&indent(depth));
+                } else if depth == 1 {
+                    letters.next_if_eq(&' ');
+                }
+            }
+            _ => {
+                quoted = letter == '"';
+                out.push(letter);
+            }
         }
     }
     out

@@ -5,6 +5,7 @@ mod form;
 use std::path::Path;
 
 use crate::document::Document;
+use crate::effects::StoredEffect;
 use crate::error::{Error, Result};
 use crate::lie::{Twist, Vec3};
 use crate::machine::{JointKind, Machine};
@@ -24,6 +25,8 @@ pub struct Faults {
     pub displacements: Vec<(usize, f64)>,
     /// Play of joints: index of the dyad.
     pub backlash: Vec<(usize, Width)>,
+    /// Named effects; every one fits the machine.
+    pub effects: Vec<StoredEffect>,
 }
 
 /// Total width of play, m or rad, constant or by the displacement of the joint; below zero counts as zero.
@@ -164,6 +167,21 @@ impl Reader<'_> {
             faults.backlash.push((j, self.width(&format!("backlash[{i}]"), j, entry)?));
         }
         self.once("backlash", faults.backlash.iter().map(|(j, _)| *j), "joint")?;
+        for (i, effect) in form.effects.iter().enumerate() {
+            const MEND: &str = "write it as `diagnose -o` writes effects into a calibrated file";
+            let path = format!("effects[{i}]");
+            let named = format!("effect {} at {}", effect.effect, effect.at);
+            let bound = match effect.bind(machine) {
+                Ok(bound) => bound,
+                Err(unbound) => return fail(path, format!("{named}: {unbound}"), MEND),
+            };
+            let mut parts = bound.iter().flat_map(|(_, parts)| parts);
+            if let Some((name, unit)) = parts.find_map(|part| part.feature.channels().into_iter().next()) {
+                let what = format!("{named} depends on {name}[{unit}], which is not simulated");
+                return fail(path, what, "leave it out");
+            }
+            faults.effects.push(effect.clone());
+        }
         Ok(faults)
     }
 

@@ -105,7 +105,7 @@ impl Instrument {
                 // (19)
                 let own =
                     machine.dyads()[dyad].joint.as_ref().map_or(Twist::zero(0.0), |joint| joint.twist());
-                let dh = state.deviations()[dyad];
+                let dh = state.deviations()[dyad] + state.behind()[dyad];
                 let read = state.displacements()[dyad] + own.v.dot(dh.v) + own.w.dot(dh.w);
                 vec![read + self.state.zero + noise(self.is_angle(machine, 0))]
             }
@@ -121,7 +121,9 @@ impl Instrument {
                 values
             }
         };
+        let kind = self.sensor.name();
         for (i, value) in values.iter_mut().enumerate() {
+            *value += state.added(i, kind);
             let step = if self.is_angle(machine, i) { self.resolution_rad } else { self.resolution_m };
             if step > 0.0 {
                 *value = (*value / step).round() * step;

@@ -6,13 +6,16 @@ use std::sync::Arc;
 use super::course::Sample;
 use super::faults::{Faults, Width};
 use super::random_deviations;
-use crate::calibration::CalibratedMachine;
+use crate::calibration::{CalibratedMachine, LeftOut, terms};
 use crate::chain::Chain;
-use crate::error::{Error, Result};
+use crate::effects::StoredEffect;
+use crate::error::Result;
+use crate::feature::Walk;
+use crate::identify::by_dyad;
 use crate::lie::{Pose, Twist};
 use crate::machine::Machine;
 use crate::motion::{Play, Tracker};
-use crate::variation::{Variation, Varying};
+use crate::variation::{Slot, Variation, Varying};
 
 /// Movements below this do not count as the first motion of a joint, m or rad: rounding of solved axes.
 const FIRST_MOTION: f64 = 1e-9;
@@ -31,8 +34,12 @@ pub struct Plant {
     constant: Vec<Twist<f64>>,
     backlash: Vec<(usize, Width)>,
     varying: Vec<(usize, ByPosition)>,
-    /// What a calibrated file says of directions of travel.
+    /// What a calibrated file says of directions of travel, and the terms of its effects.
     by_direction: Variation,
+    /// The named effects that the terms belong to.
+    effects: Vec<StoredEffect>,
+    /// Effects that cannot be simulated, and why.
+    left_out: Vec<LeftOut>,
     /// Frame `w` of the instrument in the machine's frame `w`.
     w_from_instrument: Option<Pose<f64>>,
 }
@@ -62,6 +69,14 @@ pub struct State {
     /// The pattern of directions that holds, and what it adds to the constant deviations.
     piece: Option<usize>,
     parts: Vec<Twist<f64>>,
+    /// What the features of effects remember.
+    walk: Option<Walk>,
+    /// What effects add behind the joints.
+    behind: Vec<Twist<f64>>,
+    /// What effects add to readings: reading, kind of instrument (any if `None`), m or rad.
+    added: Vec<(usize, Option<Arc<str>>, f64)>,
+    /// What the clock of the call is ahead of the course, s.
+    pub(super) later: f64,
 }
 
 impl State {
@@ -75,6 +90,19 @@ impl State {
         &self.deviations
     }
 
+    /// What effects add behind the joints of all dyads at the last sample, m and rad.
+    pub fn behind(&self) -> &[Twist<f64>] {
+        &self.behind
+    }
+
+    /// What effects add to reading `i` of an instrument of this kind at the last sample, m or rad.
+    pub fn added(&self, i: usize, kind: &str) -> f64 {
+        let own = |(reading, of, _): &&(usize, Option<Arc<str>>, f64)| {
+            *reading == i && of.as_ref().is_none_or(|of| &**of == kind)
+        };
+        self.added.iter().filter(own).map(|(.., value)| value).sum()
+    }
+
     /// Commanded displacements of all dyads' joints at the last sample, m or rad.
     pub fn displacements(&self) -> &[f64] {
         &self.displacements
@@ -82,15 +110,22 @@ impl State {
 }
 
 impl Plant {
-    /// A machine file as it is, with its deviations if it is calibrated: the constant ones, and those that change with directions
-    /// of travel.
+    /// A machine file as it is, with its deviations if it is calibrated: the constant ones, those that change with directions of
+    /// travel, and its named effects as far as they need no channel of a recording.
     pub fn new(machine: &CalibratedMachine) -> Self {
+        let (by_direction, left_out) = machine.variation_without(|_, features| {
+            let (name, unit) = features.iter().flat_map(|f| f.channels()).next()?;
+            Some(format!("it depends on {name}[{unit}], which is not simulated"))
+        });
+        let used = |e: &&StoredEffect| !left_out.iter().any(|l| l.effect == e.effect && l.at == e.at);
         Plant {
+            effects: machine.effects().iter().filter(used).cloned().collect(),
             machine: machine.machine().clone(),
             constant: machine.deviations().to_vec(),
             backlash: Vec::new(),
             varying: Vec::new(),
-            by_direction: machine.variation().clone(),
+            by_direction,
+            left_out,
             w_from_instrument: None,
         }
     }
@@ -144,6 +179,15 @@ impl Plant {
             }
         }
         self.backlash.extend(faults.backlash.iter().cloned());
+        for effect in &faults.effects {
+            // The reader of faults has bound it once.
+            let Ok(own) = terms(&self.machine, effect) else { continue };
+            for (value, term) in own {
+                self.by_direction.varying.terms.push(term);
+                self.by_direction.coefficients.push(value);
+            }
+            self.effects.push(effect.clone());
+        }
         self
     }
 
@@ -188,24 +232,47 @@ impl Plant {
         self.by_direction.varying.directions.is_some()
     }
 
+    /// The calibrated machine that this plant was made from, with all that a file can hold of it: not the play of
+    /// [`Faults::backlash`].
+    pub fn truth(&self, machine: &CalibratedMachine) -> CalibratedMachine {
+        let plain = machine.clone().with_deviations(self.constant.clone());
+        let own = machine.effects().len() - self.left_out.len();
+        let more = self.effects.get(own..).unwrap_or_default().to_vec();
+        if more.is_empty() {
+            return plain;
+        }
+        let mut bands = self.by_direction.dead_bands.clone();
+        bands.resize(self.machine.commands().len(), 0.0);
+        plain.clone().with_effects(more, bands).unwrap_or(plain)
+    }
+
+    /// Named effects that are simulated: those of the calibrated file, then those of faults.
+    pub fn effects(&self) -> &[StoredEffect] {
+        &self.effects
+    }
+
+    /// Those that are not, and why.
+    pub fn left_out(&self) -> &[LeftOut] {
+        &self.left_out
+    }
+
     /// Directions of the first motion over the samples: of every joint with play, in the order of the backlash; then, where
     /// deviations change with directions of travel, of every command.
     ///
     /// # Errors
-    /// The first one of the samples; [`Error::Motion`] where deviations depend on features of the path, which are fitted to
-    /// recordings and not simulated.
+    /// The first one of the samples.
     pub fn first_directions(&self, samples: impl Iterator<Item = Result<Sample>>) -> Result<Vec<i8>> {
         let Varying { directions, terms } = &self.by_direction.varying;
-        if !terms.is_empty() {
-            let what = format!("{}: its deviations depend on features of the path", self.machine.name());
-            let mend = "simulate a machine with constant deviations, pieces by direction, or faults";
-            return Err(Error::Motion { what, mend: mend.into() });
-        }
         let plays = self.backlash.len();
         let mut first = vec![0i8; plays];
         let mut start: Option<Vec<f64>> = None;
         let mut tracker = self.tracker(&[]);
-        let keyed: &[usize] = directions.as_ref().map_or(&[], |directions| directions.axes());
+        let every: Vec<usize> = (0..self.machine.commands().len()).collect();
+        let keyed: &[usize] = match directions {
+            _ if !terms.is_empty() => &every,
+            Some(directions) => directions.axes(),
+            None => &[],
+        };
         first.resize(plays + if keyed.is_empty() { 0 } else { self.machine.commands().len() }, 0);
         let found =
             |first: &[i8]| !first[..plays].contains(&0) && keyed.iter().all(|c| first[plays + c] != 0);
@@ -254,7 +321,13 @@ impl Plant {
             let w = self.machine.w_index();
             chain.set_previous_from_frame(w, chain.previous_from_frame(w) * shift);
         }
+        let by_command = first.get(self.backlash.len()..).unwrap_or_default();
+        let walk = (!self.by_direction.varying.terms.is_empty()).then(|| self.walk(by_command));
         State {
+            walk,
+            behind: vec![Twist::zero(0.0); self.constant.len()],
+            added: Vec::new(),
+            later: 0.0,
             chain,
             deviations: self.constant.clone(),
             displacements: vec![0.0; self.constant.len()],
@@ -264,6 +337,22 @@ impl Plant {
             piece: None,
             parts: vec![Twist::zero(0.0); self.constant.len()],
         }
+    }
+
+    /// Features of effects from the start; `first`: directions of the first motion by command.
+    fn walk(&self, first: &[i8]) -> Walk {
+        let machine = &self.machine;
+        let of = |j: usize| {
+            let terms = machine.drive(j).map_or(&[][..], |drive| &drive.terms);
+            let sum: f64 =
+                terms.iter().map(|(c, factor)| factor * f64::from(first.get(*c).copied().unwrap_or(0))).sum();
+            if sum == 0.0 { 0 } else { sum.signum() as i8 }
+        };
+        let first: Vec<i8> = (0..self.constant.len()).map(of).collect();
+        let mut bands = self.by_direction.dead_bands.clone();
+        bands.resize(machine.commands().len(), 0.0);
+        let features = self.by_direction.varying.features().cloned().collect();
+        Walk::new(machine, features, &by_dyad(machine, &bands), &first)
     }
 
     /// Direction of approach that a sample states for the joint of dyad `j`; 0 where it says nothing.
@@ -315,6 +404,36 @@ impl Plant {
         }
         for (j, deviation) in &self.varying {
             touch(&mut state.deviations, *j, deviation(s));
+        }
+        if let Some(walk) = &mut state.walk {
+            let time = Some(sample.time + state.later);
+            let values = walk.step(&self.machine, &sample.q, time, true, |c| stated_of_command(sample, c));
+            let mut values = values.into_iter();
+            state.behind.fill(Twist::zero(0.0));
+            state.added.clear();
+            let Variation { varying, coefficients, .. } = &self.by_direction;
+            // Terms without a name stand before all others.
+            let named: usize = self.effects.iter().map(|e| e.terms.len()).sum();
+            let owners = std::iter::repeat_n(None, varying.terms.len() - named)
+                .chain(self.effects.iter().flat_map(|e| e.terms.iter().map(move |_| Some(e))));
+            for ((term, coefficient), effect) in varying.terms.iter().zip(coefficients).zip(owners) {
+                for part in &term.parts {
+                    let by = coefficient * values.next().unwrap_or(0.0);
+                    match part.slot {
+                        Slot::Before(j) => touch(&mut state.deviations, j, part.direction.times(by)),
+                        Slot::Carried(j) => state.behind[j] = state.behind[j] + part.direction.times(by),
+                        Slot::Reading(i) => {
+                            let kind = effect.and_then(|e| e.instrument.as_deref());
+                            state.added.push((i, kind.map(Arc::from), by));
+                        }
+                    }
+                }
+            }
+            for part in varying.terms.iter().flat_map(|term| &term.parts) {
+                if let Slot::Carried(j) = part.slot {
+                    state.chain.set_carried(j, Pose::exp(state.behind[j]));
+                }
+            }
         }
         for j in (0..touched.len()).filter(|j| touched[*j]) {
             let mut pose = self.machine.dyads()[j].placement.pose() * Pose::exp(state.deviations[j]);

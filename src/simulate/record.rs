@@ -197,6 +197,7 @@ impl<'a> Recorder<'a> {
         for (range, q) in self.written.travel.iter_mut().zip(&sample.q) {
             *range = (range.0.min(*q), range.1.max(*q));
         }
+        state.later = later;
         plant.advance(state, sample);
         if !sample.recorded {
             return Ok(());

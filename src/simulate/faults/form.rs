@@ -2,6 +2,7 @@
 
 use serde::Deserialize;
 
+use crate::effects::StoredEffect;
 use crate::machine::{AngleUnit, LengthUnit, UnitsForm};
 
 pub(super) type Triple = (f64, f64, f64);
@@ -26,6 +27,9 @@ pub(super) struct FaultsForm {
     pub displacements: Vec<DisplacementForm>,
     #[serde(default)]
     pub backlash: Vec<BacklashForm>,
+    /// As in calibrated files, in SI.
+    #[serde(default)]
+    pub effects: Vec<StoredEffect>,
 }
 
 fn millimetres_and_degrees() -> UnitsForm {

@@ -1,0 +1,192 @@
+//! The named effects of a calibrated machine, as they are used and as they stand in its file.
+
+use super::pieces::{command, unit, unknown};
+use super::{AxisForm, CalibratedMachine, CalibrationForm, checked};
+use crate::effects::{Slot as Seat, StoredEffect};
+use crate::feature::{Feature, Unbound};
+use crate::machine::{Machine, MachineFault};
+use crate::recording::Recording;
+use crate::sensor::Sensor;
+use crate::units::Unit;
+use crate::variation::{Part, Slot, Term, Variation};
+
+/// An effect that is not used, and why.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct LeftOut {
+    /// Name of the effect.
+    pub effect: String,
+    /// Where it sits.
+    pub at: String,
+    /// Why, as the end of a sentence.
+    pub because: String,
+}
+
+impl CalibratedMachine {
+    /// The machine with named effects besides its deviations: physics that constant geometry leaves out, in the order given.
+    /// `dead_bands`: motion against the direction of travel that is no reversal yet, one per command, m or rad.
+    ///
+    /// # Errors
+    /// A frame, joint or number of an effect that cannot stand.
+    ///
+    /// # Panics
+    /// If there is not one dead band per command.
+    pub fn with_effects(mut self, effects: Vec<StoredEffect>, dead_bands: Vec<f64>) -> Result<Self, Unbound> {
+        assert_eq!(dead_bands.len(), self.machine.commands().len(), "one dead band per command");
+        for effect in effects {
+            self.add_effect(effect)?;
+        }
+        self.variation.dead_bands = dead_bands;
+        Ok(self)
+    }
+
+    /// The named effects.
+    pub fn effects(&self) -> &[StoredEffect] {
+        &self.effects
+    }
+
+    /// First and last time of the recordings that it was calibrated on, on their clock, s; known where effects are.
+    pub fn clock(&self) -> Option<(f64, f64)> {
+        self.clock
+    }
+
+    /// The machine whose last terms are those of these effects.
+    pub(crate) fn with_names(mut self, effects: Vec<StoredEffect>) -> Self {
+        self.effects = effects;
+        self
+    }
+
+    /// The machine with the clock of its recordings, s.
+    pub(crate) fn with_clock(mut self, clock: Option<(f64, f64)>) -> Self {
+        self.clock = clock;
+        self
+    }
+
+    fn add_effect(&mut self, effect: StoredEffect) -> Result<(), Unbound> {
+        for (value, term) in terms(&self.machine, &effect)? {
+            self.variation.varying.terms.push(term);
+            self.variation.coefficients.push(value);
+        }
+        self.effects.push(effect);
+        Ok(())
+    }
+
+    /// What its deviations depend on without the effects for which `because` gives a reason, and those with their reasons.
+    /// `because` sees an effect and its features.
+    pub(crate) fn variation_without(
+        &self,
+        mut because: impl FnMut(&StoredEffect, &[&Feature]) -> Option<String>,
+    ) -> (Variation, Vec<LeftOut>) {
+        let mut variation = self.variation.clone();
+        let mut left_out = Vec::new();
+        let mut kept = vec![true; variation.varying.terms.len()];
+        // Terms that belong to no named effect stand before all others.
+        let mut from = kept.len() - self.effects.iter().map(|e| e.terms.len()).sum::<usize>();
+        for effect in &self.effects {
+            let to = from + effect.terms.len();
+            let terms = &self.variation.varying.terms[from..to];
+            let features: Vec<&Feature> =
+                terms.iter().flat_map(|t| t.parts.iter().map(|p| &p.feature)).collect();
+            if let Some(because) = because(effect, &features) {
+                kept[from..to].fill(false);
+                let (effect, at) = (effect.effect.clone(), effect.at.clone());
+                left_out.push(LeftOut { effect, at, because });
+            }
+            from = to;
+        }
+        let mut keep = kept.iter();
+        variation.varying.terms.retain(|_| *keep.next().unwrap_or(&true));
+        let mut keep = kept.iter();
+        variation.coefficients.retain(|_| *keep.next().unwrap_or(&true));
+        (variation, left_out)
+    }
+
+    /// What its deviations depend on in this recording, and the effects that cannot be used there: what they need is not in it.
+    pub(crate) fn variation_in(&self, recordings: &[Recording]) -> (Variation, Vec<LeftOut>) {
+        self.variation_without(|effect, features| recordings.iter().find_map(|r| not_in(r, effect, features)))
+    }
+
+    pub(super) fn dead_band_forms(&self) -> Vec<AxisForm> {
+        if self.effects.is_empty() {
+            return Vec::new();
+        }
+        let bands = self.variation.dead_bands.iter().enumerate();
+        bands
+            .map(|(c, band)| AxisForm {
+                joint: self.machine.commands()[c].clone(),
+                dead_band: unit(&self.machine, c).write_si(*band),
+            })
+            .collect()
+    }
+
+    /// Effects with their dead bands and their clock back from the file.
+    pub(super) fn read_effects(&mut self, form: &CalibrationForm) -> Result<(), (String, MachineFault)> {
+        if let Some((from, to)) = form.clock {
+            checked("calibration.clock[0]".into(), from)?;
+            checked("calibration.clock[1]".into(), to)?;
+        }
+        self.clock = form.clock;
+        if form.effects.is_empty() {
+            return Ok(());
+        }
+        let mut bands = self.variation.dead_bands.clone();
+        bands.resize(self.machine.commands().len(), 0.0);
+        for (i, axis) in form.dead_bands.iter().enumerate() {
+            let at = format!("calibration.dead_bands[{i}]");
+            let c = command(&self.machine, &axis.joint)
+                .ok_or_else(|| unknown(&self.machine, &at, &axis.joint))?;
+            checked(format!("{at}.dead_band"), axis.dead_band)?;
+            bands[c] = unit(&self.machine, c).to_si(axis.dead_band);
+        }
+        self.variation.dead_bands = bands;
+        for (i, effect) in form.effects.iter().enumerate() {
+            self.add_effect(effect.clone()).map_err(|unbound| {
+                let what = format!("effect {} at {}: {unbound}", effect.effect, effect.at);
+                (format!("calibration.effects[{i}]"), MachineFault::BadEffect { what })
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Why an effect cannot be used in a recording.
+fn not_in(recording: &Recording, effect: &StoredEffect, features: &[&Feature]) -> Option<String> {
+    let kind = Sensor::of(recording.header()).name();
+    if let Some(own) = effect.instrument.as_ref().filter(|own| *own != kind) {
+        return Some(format!("it belongs to the instrument of the {own}, and {kind} was measured"));
+    }
+    if !recording.has_time() && features.iter().any(|f| f.needs_time() || f.needs_rates()) {
+        return Some("the recording has no time column `t`".into());
+    }
+    let here = |name: &str, symbol: &str| {
+        let quantity = Unit::named(symbol).map(|u| u.quantity);
+        recording.extra_channels().iter().any(|c| c.name == name && Some(c.unit.quantity) == quantity)
+    };
+    let mut channels = features.iter().flat_map(|f| f.channels());
+    let (name, unit) = channels.find(|(name, symbol)| !here(name, symbol))?;
+    Some(format!("the recording has no column {name}[{unit}]"))
+}
+
+/// The terms of an effect with their values.
+pub(crate) fn terms(machine: &Machine, effect: &StoredEffect) -> Result<Vec<(f64, Term)>, Unbound> {
+    let part = |part: crate::effects::BoundPart| -> Vec<Part> {
+        let on_machine = |slot| vec![Part { slot, direction: part.direction, feature: part.feature.clone() }];
+        match part.slot {
+            Seat::Before(j) => on_machine(Slot::Before(j)),
+            Seat::After(j) => on_machine(Slot::Carried(j)),
+            // A direction of the readings holds the weight of each.
+            Seat::Reading => (part.direction.to_array().into_iter().enumerate())
+                .filter(|(_, weight)| *weight != 0.0)
+                .map(|(i, weight)| Part {
+                    slot: Slot::Reading(i),
+                    direction: part.direction,
+                    feature: part.feature.scaled(weight),
+                })
+                .collect(),
+        }
+    };
+    let term = |(value, parts): (f64, Vec<crate::effects::BoundPart>)| {
+        let parts = parts.into_iter().flat_map(part).collect();
+        (value, Term { parts, scale: value.abs().max(f64::MIN_POSITIVE), prior: false })
+    };
+    Ok(effect.bind(machine)?.into_iter().map(term).collect())
+}

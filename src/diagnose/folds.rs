@@ -1,0 +1,116 @@
+//! Held-out figures: what the model predicts on stretches that took no part in its fit.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::finding::{Diagnosis, HeldOutPair, HeldOutRms, rms_of};
+use super::search::{Active, ROOM, Search};
+
+/// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
+const FOLDS: usize = 5;
+
+/// Fits coefficients (geometry and effects, on the linearised model) with each fold left out in turn, and puts what is left there
+/// into the diagnosis. Nonlinear parameters and the choice of effects stay as all samples gave them.
+pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) {
+    let Some(folds) = Folds::new(search, told) else { return };
+    let count = folds.owner.len();
+    let constants = folds.raw.ncols() - told.iter().map(|e| e.columns.ncols()).sum::<usize>();
+    let mut owner: Vec<Option<usize>> = vec![None; constants];
+    for (i, effect) in told.iter().enumerate() {
+        owner.extend(vec![Some(i); effect.columns.ncols()]);
+    }
+    let with = |takes: &dyn Fn(usize) -> bool| -> Vec<f64> {
+        let columns: Vec<usize> = (0..owner.len()).filter(|c| owner[*c].is_none_or(takes)).collect();
+        let left = folds.left_out(search, &columns);
+        debug_assert_eq!(left.len(), count);
+        left
+    };
+    let (geometric, last) = (with(&|_| false), with(&|_| true));
+    let both = |angle: bool| {
+        let rms = |left: &[f64]| rms_of(search, left, angle);
+        Some(HeldOutRms { geometric: rms(&geometric)?, r#final: rms(&last)? })
+    };
+    (diagnosis.held_out_rms_m, diagnosis.held_out_rms_rad) = (both(false), both(true));
+    for (i, finding) in diagnosis.findings.iter_mut().enumerate() {
+        let before = with(&|effect| effect != i);
+        let pair = |angle: bool| {
+            let rms = |left: &[f64]| rms_of(search, left, angle);
+            Some(HeldOutPair { before: rms(&before)?, after: rms(&last)? })
+        };
+        (finding.held_out_rms_m, finding.held_out_rms_rad) = (pair(false), pair(true));
+    }
+}
+
+/// Normal equations of all samples and of each fold.
+struct Folds {
+    /// Columns as they are, m and rad.
+    raw: DMatrix<f64>,
+    /// The fold of each row.
+    owner: Vec<usize>,
+    /// Of the whitened rows of each fold.
+    grams: Vec<(DMatrix<f64>, DVector<f64>)>,
+}
+
+impl Folds {
+    /// `None` where there are too few rows, or a column cannot be built.
+    fn new(search: &Search, told: &[Active]) -> Option<Self> {
+        let rows = search.rows;
+        let linear = rows.linear;
+        let mut raw = linear.constant.clone();
+        for effect in told {
+            let own = rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)?;
+            let (at, count) = (raw.ncols(), effect.columns.ncols());
+            raw = raw.insert_columns(at, count, 0.0);
+            raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * ROOM));
+        }
+        let mut owner = vec![0; linear.residual.len()];
+        for span in &linear.spans {
+            let count = span.samples.1 - span.samples.0;
+            if count < 2 * FOLDS {
+                return None;
+            }
+            let rows = span.rows.0..span.rows.1;
+            for (fold, sample) in owner[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
+                *fold = (sample - span.samples.0) * FOLDS / count;
+            }
+        }
+        let mut white = raw.clone();
+        rows.whiten(&mut white);
+        let grams = (0..FOLDS)
+            .map(|fold| {
+                let own: Vec<usize> = (0..owner.len()).filter(|row| owner[*row] == fold).collect();
+                let columns = white.select_rows(&own);
+                let residual = rows.residual.select_rows(&own);
+                (columns.tr_mul(&columns), columns.tr_mul(&residual))
+            })
+            .collect();
+        Some(Folds { raw, owner, grams })
+    }
+
+    /// Residuals of every row under the fit of these columns to the folds that the row is not in, m and rad.
+    fn left_out(&self, search: &Search, columns: &[usize]) -> Vec<f64> {
+        let total = |of: &dyn Fn(usize) -> bool| {
+            let width = self.raw.ncols();
+            let start = (DMatrix::<f64>::zeros(width, width), DVector::<f64>::zeros(width));
+            let used = self.grams.iter().enumerate().filter(|(fold, _)| of(*fold));
+            let (gram, b) = used.fold(start, |(g, b), (_, (own, toward))| (g + own, b + toward));
+            (gram.select_rows(columns).select_columns(columns), b.select_rows(columns))
+        };
+        let solutions: Vec<Option<DVector<f64>>> = (0..FOLDS)
+            .map(|fold| {
+                let (mut gram, b) = total(&|other| other != fold);
+                (0..columns.len()).for_each(|i| gram[(i, i)] += 1.0);
+                Cholesky::new(gram).map(|cholesky| cholesky.solve(&b))
+            })
+            .collect();
+        let residual = &search.rows.linear.residual;
+        (0..residual.len())
+            .map(|row| match &solutions[self.owner[row]] {
+                Some(x) => {
+                    let model = columns.iter().zip(x.iter()).map(|(c, x)| self.raw[(row, *c)] * x);
+                    residual[row] - model.sum::<f64>()
+                }
+                None => residual[row],
+            })
+            .collect()
+    }
+}
