@@ -23,4 +23,4 @@ pub use check::{DimensionFault, Scope, dimension_of};
 pub use dimension::Dimension;
 pub use evaluate::Memory;
 pub use expression::Expression;
-pub use samples::{Follow, FollowOptions, JointSamples, Samples, first_directions, samples_of};
+pub use samples::{Follow, FollowOptions, JointSamples, Samples, first_directions, gravity_of, samples_of};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::chain::{Chain, Sweep};
 use crate::error::Result;
-use crate::lie::Vec3;
+use crate::lie::{Pose, Vec3};
 use crate::machine::{Branch, Drive, JointKind, Machine};
 use crate::motion::{Axis, LOOK_AHEAD, Rates, stated};
 use crate::recording::{Chunk, Recording};
@@ -237,12 +237,28 @@ pub struct FollowOptions {
     pub first_directions: Vec<i8>,
     /// A longer time between two samples is a pause, s.
     pub pause_after: f64,
-    /// Direction of gravity in frame `w`, where the recording states one.
-    pub gravity_w: Option<Vec3<f64>>,
+    /// Direction of gravity in the base frame, [`gravity_of`]; where there is none, that of the machine file.
+    pub gravity_b: Option<Vec3<f64>>,
     /// Names of the extra channels in the order of the chunks.
     pub channels: Vec<String>,
     /// Whether columns `gravity` and `load` are wanted.
     pub with_gravity: bool,
+}
+
+/// Direction of gravity in the base frame, where the recording states it in frame `w`: that frame, all joints at zero, stands where
+/// `previous_from_w` says, or else where the machine file has it.
+pub fn gravity_of(
+    recording: &Recording,
+    machine: &Machine,
+    previous_from_w: Option<Pose<f64>>,
+) -> Option<Vec3<f64>> {
+    let gravity_w = recording.header().gravity_w?;
+    let mut chain = Chain::nominal(machine);
+    if let Some(previous_from_w) = previous_from_w {
+        chain.set_previous_from_frame(machine.w_index(), previous_from_w);
+    }
+    let home = chain.sweep(&vec![0.0; machine.commands().len()]);
+    Some(home.b_from_w().rotation * gravity_w)
 }
 
 /// The part of [`Follow`] that knows no chunks.
@@ -254,10 +270,9 @@ struct Weights {
 }
 
 impl Weights {
-    fn new(machine: &Machine, gravity_w: Option<Vec3<f64>>) -> Self {
+    fn new(machine: &Machine, gravity_b: Option<Vec3<f64>>) -> Self {
         let chain = Chain::nominal(machine);
-        let home = chain.sweep(&vec![0.0; machine.commands().len()]);
-        let g_b = gravity_w.map_or(machine.gravity_b(), |g_w| home.b_from_w().rotation * g_w);
+        let g_b = gravity_b.unwrap_or(machine.gravity_b());
         let dyads = machine.dyads();
         let beyond = |j: usize| {
             let end =
@@ -285,7 +300,7 @@ impl Weights {
         };
         let place = |k: usize, centre: Vec3<f64>| {
             let behind = match &machine.dyads()[k].joint {
-                Some(joint) => crate::lie::Pose::exp(joint.twist().times(displacements[k])).transform(centre),
+                Some(joint) => Pose::exp(joint.twist().times(displacements[k])).transform(centre),
                 None => centre,
             };
             sweep.b_from_frame(k).transform(behind)
@@ -315,7 +330,7 @@ impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
             machine,
             chunks,
             history: History::new(machine, &options.dead_bands, &options.first_directions),
-            weights: options.with_gravity.then(|| Weights::new(machine, options.gravity_w)),
+            weights: options.with_gravity.then(|| Weights::new(machine, options.gravity_b)),
             held: None,
             before: Vec::new(),
             started: false,
@@ -440,7 +455,7 @@ pub fn samples_of(recording: &Recording, machine: &Machine, dead_bands: &[f64]) 
         dead_bands: dead_bands.to_vec(),
         first_directions: first,
         pause_after: recording.scan()?.pause_after.unwrap_or(f64::INFINITY),
-        gravity_w: recording.header().gravity_w,
+        gravity_b: gravity_of(recording, machine, None),
         channels: recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
         with_gravity: true,
     };
