@@ -17,10 +17,12 @@ mod evaluate;
 mod expression;
 mod formula;
 mod samples;
+mod weights;
 
 pub use bind::{Binding, Feature, Unbound};
 pub use check::{DimensionFault, Scope, dimension_of};
 pub use dimension::Dimension;
 pub use evaluate::Memory;
 pub use expression::Expression;
-pub use samples::{Follow, FollowOptions, JointSamples, Samples, first_directions, gravity_of, samples_of};
+pub use samples::{Follow, FollowOptions, JointSamples, Samples, first_directions, samples_of};
+pub use weights::gravity_of;

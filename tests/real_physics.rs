@@ -3,7 +3,7 @@
 //! `cargo test --release --test real_physics -- --nocapture` prints the figures of `docs/real-recordings.md`. With
 //! `KINCAL_SET=hilti_jaibot KINCAL_TERMS=gravity_compliance@q2,backlash@q1` one set is fitted with those effects;
 //! `KINCAL_EFFECTS=FILE` adds families. A term is `effect@joint`, `effect@joint/partner`, `*` for every joint, and
-//! `:p` behind it its parameters in SI.
+//! `:p;q` behind it its parameters in SI, `#n` its first `n` features instead of the least number.
 
 mod common;
 
@@ -25,15 +25,17 @@ struct Asked<'a> {
     at: &'a str,
     with: Option<&'a str>,
     parameters: Vec<f64>,
+    features: Option<usize>,
 }
 
 impl<'a> Asked<'a> {
     fn parse(text: &'a str) -> Self {
+        let (text, features) = text.split_once('#').unwrap_or((text, ""));
         let (place, numbers) = text.split_once(':').unwrap_or((text, ""));
         let (effect, at) = place.split_once('@').expect("effect@joint");
         let (at, with) = at.split_once('/').map_or((at, None), |(at, with)| (at, Some(with)));
         let parameters = numbers.split(';').filter(|n| !n.is_empty()).map(|n| n.parse().expect("a number"));
-        Asked { effect, at, with, parameters: parameters.collect() }
+        Asked { effect, at, with, parameters: parameters.collect(), features: features.parse().ok() }
     }
 }
 
@@ -61,7 +63,8 @@ fn terms(set: &Set, library: &Library, asked: &str) -> (Varying, Vec<String>) {
             } else {
                 &asked.parameters
             };
-            for coefficient in &candidate.coefficients {
+            let taken = asked.features.unwrap_or(candidate.least);
+            for coefficient in candidate.coefficients.iter().filter(|c| c.order < taken) {
                 let feature = |f: usize| candidate.features[f].with(parameters);
                 let column = feature(coefficient.parts[0].feature).over(&samples, &[]);
                 let rms = (column.iter().map(|x| x * x).sum::<f64>() / column.len() as f64).sqrt();
