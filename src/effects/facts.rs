@@ -12,7 +12,8 @@ pub struct RecordingFacts {
     pub travel: Vec<Option<(f64, f64)>>,
     /// Motion against the direction of travel that counts as a reversal only beyond this, m or rad, for each dyad.
     pub dead_bands: Vec<f64>,
-    /// Median gap between neighbouring distinct positions of every dyad's joint over all recordings, m or rad; 0 where it is not known.
+    /// Median gap between neighbouring distinct positions of every dyad's joint over all recordings, m or rad; the whole travel where
+    /// they are few targets visited again and again; 0 where the joint stands still.
     pub spacing: Vec<f64>,
     /// First and last time, s, if all recordings have one.
     pub time: Option<(f64, f64)>,
@@ -37,6 +38,10 @@ const SETTLED_STEP: f64 = 0.05;
 
 /// Positions that are looked at for their gaps.
 const POSITIONS: usize = 100_000;
+/// Parts of the travel that are looked at for whether a position lies in them.
+const PARTS: f64 = 1000.0;
+/// So few parts of the travel with positions in them are targets.
+const FEW: usize = 16;
 /// Positions closer than this part of the travel are one.
 const ALIKE: f64 = 1e-6;
 
@@ -170,11 +175,17 @@ fn readings(machine: &Machine, recording: &Recording) -> Vec<Quantity> {
     }
 }
 
-/// Median gap between distinct positions.
+/// Median gap between distinct positions; the whole travel where they are few targets again and again, at which any wave can be drawn.
 fn spacing(mut positions: Vec<f64>, (from, to): (f64, f64)) -> f64 {
     positions.sort_by(f64::total_cmp);
-    let gaps = positions.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > ALIKE * (to - from));
-    median(gaps)
+    let places = positions
+        .iter()
+        .map(|q| ((q - from) / (to - from) * PARTS) as i64)
+        .fold((i64::MIN, 0), |(last, n), at| (at, n + usize::from(at != last)));
+    if places.1 < FEW {
+        return to - from;
+    }
+    median(positions.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > ALIKE * (to - from)))
 }
 
 fn median(numbers: impl Iterator<Item = f64>) -> f64 {

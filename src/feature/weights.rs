@@ -8,6 +8,8 @@ use crate::recording::Recording;
 
 /// Standard acceleration of gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
+/// What an upright axis bears about itself is rounding and counts as nothing, Nm or N.
+const ROUNDING: f64 = 1e-9;
 /// Columns of [`JointSamples::weights`] before the levers: three moments and how they change along the axis.
 const MOMENTS: usize = 6;
 
@@ -173,6 +175,11 @@ impl Weights {
             n_b.dot((behind(*k).rotation * arm).cross(self.g_b))
         });
         columns.weights.resize(MOMENTS + self.levers[j].len(), Vec::new());
-        columns.weights.iter_mut().zip(moments.chain(shears).chain(levers)).for_each(|(c, x)| c.push(x));
+        let all = moments.chain(shears).chain(levers);
+        columns
+            .weights
+            .iter_mut()
+            .zip(all)
+            .for_each(|(c, x)| c.push(if x.abs() < ROUNDING { 0.0 } else { x }));
     }
 }
