@@ -18,6 +18,7 @@ mod expression;
 mod formula;
 mod samples;
 mod walk;
+mod weights;
 
 pub use bind::{Binding, Feature, Unbound};
 pub use check::{DimensionFault, Scope, dimension_of};
@@ -26,3 +27,4 @@ pub use evaluate::Memory;
 pub use expression::Expression;
 pub use samples::{Follow, FollowOptions, JointSamples, Samples, first_directions, samples_of};
 pub(crate) use walk::Walk;
+pub use weights::gravity_of;

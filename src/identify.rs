@@ -134,11 +134,12 @@ pub fn calibrate_model(
         });
     }
     let prior = options.prior && options.solver.uses_prior();
+    let start = Unknowns::nominal(machine, &sources, varying);
+    turn_gravity(machine, &mut sources, &layout, start.clone())?;
     // As declared: only what nobody has stated is fitted.
     let mut problem = Problem::new(machine, &sources, &layout, varying, is_of_setup);
     problem.progress = progress;
     progress("finding the set-ups");
-    let start = Unknowns::nominal(machine, &sources, varying);
     let Placed { solution: placed, noise, thin } = place(&mut problem, start)?;
     let nominal = placed.normal.tallies.clone();
     let declared = placed.unknowns.clone();
@@ -200,17 +201,18 @@ pub fn fit_setup(
     let (machine, (variation, _)) = (calibrated.machine(), calibrated.variation_in(recordings));
     let varying = &variation.varying;
     let dead_bands: Vec<_> = variation.dead_bands.iter().map(|band| Some(*band)).collect();
-    let sources = Sources::new(recordings, machine, varying, &dead_bands, &|_| {})?;
+    let mut sources = Sources::new(recordings, machine, varying, &dead_bands, &|_| {})?;
     enough_for_setups(&sources)?;
     let layout = Layout::new(machine, &sources, varying, 1.0);
-    let mut problem = Problem::new(machine, &sources, &layout, varying, |block| {
-        !matches!(block.role, Role::Dyad(_) | Role::Part { .. } | Role::Term(_))
-    });
-    problem.loss = loss;
     let mut start = Unknowns::nominal(machine, &sources, varying);
     start.dh = calibrated.deviations().to_vec();
     (start.parts, start.coefficients) = (variation.parts.clone(), variation.coefficients.clone());
     start.dh[machine.w_index()] = Twist::zero(0.0);
+    turn_gravity(machine, &mut sources, &layout, start.clone())?;
+    let mut problem = Problem::new(machine, &sources, &layout, varying, |block| {
+        !matches!(block.role, Role::Dyad(_) | Role::Part { .. } | Role::Term(_))
+    });
+    problem.loss = loss;
     let Placed { solution: placed, noise, .. } = place(&mut problem, start)?;
     let found = settle(&problem, Solver::LevenbergMarquardt, placed.unknowns, noise)?;
     let mut fitted = calibrated.clone();
@@ -318,6 +320,21 @@ struct Placed {
     solution: Solution,
     noise: Vec<Noise>,
     thin: Vec<Thin>,
+}
+
+/// Where gravity is stated in a frame `w` that nobody knows, that frame is found first, with constant deviations alone: what weighs
+/// depends on it. What is left of its error, some millirad, changes a torque by some thousandths.
+fn turn_gravity(machine: &Machine, sources: &mut Sources, layout: &Layout, start: Unknowns) -> Result<()> {
+    let stated =
+        |s: &source::Source| s.recording.header().gravity_w.is_some() && sources.frame_unknown[s.setup];
+    if !(sources.has_weight() && sources.all.iter().any(stated)) {
+        return Ok(());
+    }
+    let (constant, start) =
+        (Varying::default(), Unknowns { coefficients: vec![0.0; start.coefficients.len()], ..start });
+    let mut problem = Problem::new(machine, sources, layout, &constant, is_of_setup);
+    let frames = place(&mut problem, start)?.solution.unknowns.setups;
+    sources.turn_gravity(|setup| frames[setup].pose())
 }
 
 /// Set-ups found from nothing and then exactly, the machine held. What the data leave open of them is frozen, here and in all that

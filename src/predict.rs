@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::calibration::{CalibratedMachine, LeftOut};
 use crate::chain::Chain;
 use crate::error::{Error, Result};
+use crate::feature::gravity_of;
 use crate::identify::{Beginning, Evaluator, Memories, Moment, Stretch, Values, channel, stretches};
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
@@ -116,7 +117,10 @@ pub fn predict(
     let beginning = if varying.is_constant() {
         None
     } else {
-        Some(Beginning::of(recording, machine, varying, dead_bands)?)
+        let mut beginning = Beginning::of(recording, machine, varying, dead_bands)?;
+        let w = previous_from_w * Pose::exp(dh[machine.w_index()]);
+        beginning.gravity_b = gravity_of(recording, machine, Some(w));
+        Some(beginning)
     };
     let pause_after = if varying.is_constant() { None } else { recording.scan()?.pause_after };
     let mut memories = Memories::new(varying);

@@ -4,7 +4,7 @@ use super::facts::RecordingFacts;
 use super::family::{Directions, Family, Grid, Partner, Pivot, Seat};
 use super::grid;
 use super::library::Library;
-use crate::feature::{Binding, Dimension, Expression, Feature, Scope, dimension_of};
+use crate::feature::{Binding, Dimension, Expression, Feature, Scope, Unbound, dimension_of};
 use crate::lie::{Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::units::{Quantity, Unit};
@@ -246,7 +246,7 @@ fn candidate(
         Feature::bind(expression, &binding(own)).map_err(|e| e.to_string()).and_then(|f| has_all(f, facts))
     };
     let ranges = (family.parameters.iter())
-        .map(|form| grid::range(form, own_kind, travel, facts))
+        .map(|form| grid::range(form, own_kind, travel, own.map_or(0.0, |j| facts.spacing[j]), facts))
         .collect::<Result<Vec<_>, _>>()?;
 
     // Features of the own joint; a family on every joint has those of each joint in their turn.
@@ -255,9 +255,15 @@ fn candidate(
         true => machine.joints().map(|(j, _)| j).filter(|j| facts.moves(*j)).map(Some).collect(),
         false => vec![own],
     };
+    // Levers of joints that are not there are no features of this place.
+    let there = |e: &Expression| {
+        owners.iter().all(|own| !matches!(Feature::bind(e, &binding(*own)), Err(Unbound::NoLever)))
+    };
+    let own_features: Vec<(usize, &Expression)> =
+        family.features.iter().enumerate().filter(|(_, e)| there(e)).collect();
     let mut features = Vec::new();
     for owner in &owners {
-        for expression in &family.features {
+        for (_, expression) in &own_features {
             features.push(bind(expression, *owner)?);
         }
     }
@@ -274,13 +280,14 @@ fn candidate(
             parameter: &parameter,
         };
         let one = |e: &Expression| dimension_of(e, &scope).map_err(|fault| fault.to_string());
-        family.features.iter().map(one).collect::<Result<Vec<_>, _>>()
+        own_features.iter().map(|(_, e)| one(e)).collect::<Result<Vec<_>, _>>()
     };
     let dimensions = dimensions(owners.first().copied().flatten())?;
 
     let directions = directions(family, place, machine, facts);
     let mut coefficients = Vec::new();
-    for (order, dimension) in dimensions.iter().enumerate() {
+    for (index, ((order, _), dimension)) in own_features.iter().zip(&dimensions).enumerate() {
+        let order = *order;
         if every {
             let parts = (owners.iter().flatten().enumerate())
                 .map(|(i, j)| Part {
@@ -289,7 +296,7 @@ fn candidate(
                         .joint
                         .as_ref()
                         .map_or(Twist::zero(0.0), |joint| joint.twist()),
-                    feature: i * family.features.len() + order,
+                    feature: i * own_features.len() + index,
                 })
                 .collect();
             // Deviation and feature carry the same joint's unit: what is left is the same for all.
@@ -303,7 +310,7 @@ fn candidate(
         for (name, slot, direction, unit) in &directions {
             let size = if *unit == Dimension::ANGLE { family.size.urad } else { family.size.um } * 1e-6;
             let name = if directions.len() > 1 { name.clone() } else { String::new() };
-            let part = Part { slot: *slot, direction: *direction, feature: order };
+            let part = Part { slot: *slot, direction: *direction, feature: index };
             coefficients.push(Coefficient {
                 order,
                 direction: name,
@@ -316,7 +323,13 @@ fn candidate(
     if coefficients.is_empty() && family.scatter.is_none() {
         return Err("the instrument reads nothing that it could change".into());
     }
-    let whole = |i: usize| family.parameters[i].grid == Grid::Whole;
+    // A whole number of teeth has no derivative that says anything.
+    let turned = travel.is_some_and(|(a, b)| b - a >= 0.99 * std::f64::consts::TAU);
+    let whole = |i: usize| match family.parameters[i].grid {
+        Grid::Whole => true,
+        Grid::Orders(_) => turned,
+        _ => false,
+    };
     let parameters = (family.parameters.iter().zip(&ranges).enumerate())
         .map(|(i, (form, range))| Parameter {
             name: form.name.clone(),
@@ -394,7 +407,7 @@ fn directions(
             |v: Vec3<f64>| all.push((named('v', v), slot(j), Twist::new(v, zero), Dimension::LENGTH));
         match set {
             Directions::Translations => basis().into_iter().for_each(&mut translation),
-            Directions::Across => across(axis).into_iter().for_each(&mut translation),
+            Directions::Across => axis.across().into_iter().for_each(&mut translation),
             Directions::Slide => translation(axis),
             _ => {}
         }
@@ -402,7 +415,7 @@ fn directions(
             |w: Vec3<f64>| all.push((named('w', w), slot(j), Twist::new(zero, w), Dimension::ANGLE));
         match set {
             Directions::Rotations => basis().into_iter().for_each(&mut rotation),
-            Directions::Tilts => across(axis).into_iter().for_each(&mut rotation),
+            Directions::Tilts => axis.across().into_iter().for_each(&mut rotation),
             Directions::Turn => rotation(axis),
             _ => {}
         }
@@ -420,21 +433,6 @@ fn reads(facts: &RecordingFacts, quantity: Quantity) -> bool {
 
 fn basis() -> [Vec3<f64>; 3] {
     [Vec3([1.0, 0.0, 0.0]), Vec3([0.0, 1.0, 0.0]), Vec3([0.0, 0.0, 1.0])]
-}
-
-/// Two unit vectors that stand square to the axis and to each other; the frame's own where they do.
-pub(super) fn across(axis: Vec3<f64>) -> [Vec3<f64>; 2] {
-    let largest = (0..3).max_by(|a, b| axis.0[*a].abs().total_cmp(&axis.0[*b].abs())).unwrap_or(2);
-    let mut others = (0..3).filter(|k| *k != largest).map(|k| basis()[k]);
-    let first = others.next().unwrap_or(Vec3([1.0, 0.0, 0.0]));
-    let first = first - axis.times(axis.dot(first));
-    let first = first.times(first.norm().recip());
-    let mut second = axis.cross(first);
-    // With the sign of the frame's own vector.
-    if second.0.iter().fold(0.0f64, |m, x| if x.abs() > m.abs() { *x } else { m }) < 0.0 {
-        second = -second;
-    }
-    [first, second]
 }
 
 /// `vx` for a frame's own vector, `v` with its components for another.

@@ -12,6 +12,9 @@ pub struct RecordingFacts {
     pub travel: Vec<Option<(f64, f64)>>,
     /// Motion against the direction of travel that counts as a reversal only beyond this, m or rad, for each dyad.
     pub dead_bands: Vec<f64>,
+    /// Median gap between neighbouring distinct positions of every dyad's joint over all recordings, m or rad; the whole travel where
+    /// they are few targets visited again and again; 0 where the joint stands still.
+    pub spacing: Vec<f64>,
     /// First and last time, s, if all recordings have one.
     pub time: Option<(f64, f64)>,
     /// Duration of the longest recording, s.
@@ -33,6 +36,15 @@ const JITTER: (f64, f64) = (1e-9, 1e-4);
 /// Samples are settled positions where the median step of the joint that moves most is above this share of its range.
 const SETTLED_STEP: f64 = 0.05;
 
+/// Positions that are looked at for their gaps.
+const POSITIONS: usize = 100_000;
+/// Parts of the travel that are looked at for whether a position lies in them.
+const PARTS: f64 = 1000.0;
+/// So few parts of the travel with positions in them are targets.
+const FEW: usize = 16;
+/// Positions closer than this part of the travel are one.
+const ALIKE: f64 = 1e-6;
+
 impl RecordingFacts {
     /// Reads every recording once.
     ///
@@ -44,6 +56,7 @@ impl RecordingFacts {
             travel: vec![None; dyads],
             // Smallest steps, until all recordings are read.
             dead_bands: vec![f64::INFINITY; dyads],
+            spacing: vec![0.0; dyads],
             time: None,
             longest: 0.0,
             step: None,
@@ -52,9 +65,10 @@ impl RecordingFacts {
             readings: Vec::new(),
         };
         let mut all_timed = true;
+        let mut seen: Vec<Vec<f64>> = vec![Vec::new(); dyads];
         for (i, recording) in recordings.iter().enumerate() {
             all_timed &= recording.has_time();
-            facts.take(machine, recording)?;
+            facts.take(machine, recording, &mut seen)?;
             let channels = recording.extra_channels().iter().map(|c| (c.name.clone(), c.unit.quantity));
             match i {
                 0 => facts.channels = channels.collect(),
@@ -71,6 +85,9 @@ impl RecordingFacts {
         if !all_timed {
             (facts.time, facts.step, facts.longest) = (None, None, 0.0);
         }
+        for (j, positions) in seen.into_iter().enumerate() {
+            facts.spacing[j] = facts.travel[j].map_or(0.0, |travel| spacing(positions, travel));
+        }
         for (band, travel) in facts.dead_bands.iter_mut().zip(&facts.travel) {
             let range = travel.map_or(0.0, |(from, to)| to - from);
             *band = (1.5 * *band).max(JITTER.0 * range).min(JITTER.1 * range);
@@ -78,7 +95,7 @@ impl RecordingFacts {
         Ok(facts)
     }
 
-    fn take(&mut self, machine: &Machine, recording: &Recording) -> Result<()> {
+    fn take(&mut self, machine: &Machine, recording: &Recording, seen: &mut [Vec<f64>]) -> Result<()> {
         let commands = machine.commands().len();
         let mut own: Vec<Option<(f64, f64)>> = vec![None; machine.dyads().len()];
         let mut steps: Vec<(f64, Vec<f64>)> = Vec::new();
@@ -90,6 +107,9 @@ impl RecordingFacts {
                 let displacements = machine.displacements(q);
                 for (j, _) in machine.joints() {
                     let q = displacements[j];
+                    if seen[j].len() < POSITIONS {
+                        seen[j].push(q);
+                    }
                     let (from, to) = own[j].unwrap_or((q, q));
                     own[j] = Some((from.min(q), to.max(q)));
                 }
@@ -153,6 +173,19 @@ fn readings(machine: &Machine, recording: &Recording) -> Vec<Quantity> {
         }
         Measurement::Distance { .. } | Measurement::Displacement => vec![Quantity::Length],
     }
+}
+
+/// Median gap between distinct positions; the whole travel where they are few targets again and again, at which any wave can be drawn.
+fn spacing(mut positions: Vec<f64>, (from, to): (f64, f64)) -> f64 {
+    positions.sort_by(f64::total_cmp);
+    let places = positions
+        .iter()
+        .map(|q| ((q - from) / (to - from) * PARTS) as i64)
+        .fold((i64::MIN, 0), |(last, n), at| (at, n + usize::from(at != last)));
+    if places.1 < FEW {
+        return to - from;
+    }
+    median(positions.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > ALIKE * (to - from)))
 }
 
 fn median(numbers: impl Iterator<Item = f64>) -> f64 {

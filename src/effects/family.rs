@@ -176,6 +176,8 @@ pub enum Grid {
     Parts(usize),
     /// Whole numbers.
     Whole,
+    /// Numbers per turn: whole ones where a full turn or more was seen, else steps of this part of a wave over the travel seen.
+    Orders(f64),
     /// Periods: one over them grows by this part of one over the travel (or time) seen.
     Periods(f64),
     /// Frequencies: they grow by this part of one over the longest recording.

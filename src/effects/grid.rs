@@ -13,6 +13,7 @@ pub(super) fn range(
     form: &ParameterForm,
     own: Option<JointKind>,
     travel: Option<(f64, f64)>,
+    spacing: f64,
     facts: &RecordingFacts,
 ) -> Result<(f64, f64), String> {
     match form.range {
@@ -20,9 +21,29 @@ pub(super) fn range(
         Range::Time => facts.time.ok_or_else(|| NO_TIME.into()).map(|(from, to)| (0.0, to - from)),
         Range::ByKind | Range::Between(..) => {
             let (from, to, dimension) = form.stated(own).ok_or("no range is given for this kind of place")?;
-            Ok(narrowed(form, dimension, (from, to), travel, facts))
+            let (from, to) = narrowed(form, dimension, (from, to), travel, facts);
+            resolved(form, dimension, (from, to), spacing)
         }
     }
+}
+
+/// Waves need two positions each: what is finer than the positions lie apart cannot be told from what is coarse.
+fn resolved(
+    form: &ParameterForm,
+    dimension: Dimension,
+    (from, to): (f64, f64),
+    spacing: f64,
+) -> Result<(f64, f64), String> {
+    let wave = 2.0 * spacing;
+    let (from, to) = match form.grid {
+        Grid::Periods(_) if dimension != Dimension::TIME => (from.max(wave), to),
+        Grid::Orders(_) if wave > 0.0 => (from, to.min(std::f64::consts::TAU / wave)),
+        _ => return Ok((from, to)),
+    };
+    if from > to {
+        return Err("positions lie too far apart to show it".into());
+    }
+    Ok((from, to))
 }
 
 pub(super) const NO_TIME: &str = "it needs time, and a recording has no column t";
@@ -73,7 +94,12 @@ pub(super) fn points(
             let values = match &forms[i].grid {
                 Grid::Logarithmic(ratio) => logarithmic(from, to, *ratio),
                 Grid::Parts(parts) => even(from, to, *parts),
-                Grid::Whole => (from.ceil() as i64..=to.floor() as i64).map(|n| n as f64).collect(),
+                Grid::Whole => whole(from, to),
+                Grid::Orders(_) if seen >= 0.99 * std::f64::consts::TAU => whole(from, to),
+                Grid::Orders(part) => {
+                    let parts = ((to - from) * seen / std::f64::consts::TAU / part).ceil().max(1.0) as usize;
+                    even(from, to, parts.min(MOST_POINTS))
+                }
                 Grid::Periods(part) => {
                     let extent = if forms[i].unit == "s" { facts.longest } else { seen };
                     let (most, least) = (1.0 / from, 1.0 / to);
@@ -100,6 +126,10 @@ pub(super) fn points(
     }
     points.truncate(MOST_POINTS);
     points
+}
+
+fn whole(from: f64, to: f64) -> Vec<f64> {
+    (from.ceil() as i64..=to.floor() as i64).map(|n| n as f64).collect()
 }
 
 fn even(from: f64, to: f64, parts: usize) -> Vec<f64> {

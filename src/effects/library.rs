@@ -266,7 +266,9 @@ fn check_parameters(family: &Family) -> Checked<()> {
             Grid::Logarithmic(ratio) => *ratio > 1.0 && *ratio <= 10.0,
             Grid::Parts(parts) => (1..=100_000).contains(parts),
             Grid::Whole => true,
-            Grid::Periods(part) | Grid::Frequencies(part) => *part >= 0.01 && *part <= 1.0,
+            Grid::Periods(part) | Grid::Frequencies(part) | Grid::Orders(part) => {
+                *part >= 0.01 && *part <= 1.0
+            }
             Grid::Within(other, part) => {
                 let known =
                     family.parameters.iter().any(|p| p.name == *other && !matches!(p.grid, Grid::Within(..)));

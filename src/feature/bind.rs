@@ -1,6 +1,6 @@
 //! From an expression to a feature of one machine, and back.
 
-use super::Expression;
+use super::{Expression, weights};
 use crate::machine::Machine;
 use crate::units::Unit;
 
@@ -56,6 +56,8 @@ pub(super) enum Column {
     Travelled,
     Gravity,
     Load,
+    /// A column of `JointSamples::weights`.
+    Weight(usize),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +69,7 @@ pub(super) enum Function {
     Sign,
     Positive,
     Step,
+    Saturate,
     Bump,
 }
 
@@ -105,6 +108,9 @@ pub enum Unbound {
     /// No range of time is known.
     #[error("the recordings have no time column `t`")]
     NoTime,
+    /// No joint stands there to bear it.
+    #[error("the joint has no such joint beyond it")]
+    NoLever,
     /// A parameter that is not declared.
     #[error("parameter \"{0}\" is not declared")]
     Parameter(String),
@@ -221,7 +227,7 @@ impl Feature {
 
     /// Whether it needs gravity's columns.
     pub fn needs_gravity(&self) -> bool {
-        any(&self.node, &|n| matches!(n, Node::Joint(_, Column::Gravity | Column::Load)))
+        any(&self.node, &|n| matches!(n, Node::Joint(_, Column::Gravity | Column::Load | Column::Weight(_))))
     }
 
     /// Whether it depends on which way a joint has come.
@@ -296,6 +302,12 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
         E::Travelled => column(Column::Travelled)?,
         E::Gravity => column(Column::Gravity)?,
         E::Load => column(Column::Load)?,
+        E::Moment(n) => column(Column::Weight(weights::moment(*n)))?,
+        E::Shear(n) => column(Column::Weight(weights::shear(*n)))?,
+        E::Lever(k, n) => {
+            let index = weights::lever(b.machine, own()?, *k, *n).ok_or(Unbound::NoLever)?;
+            column(Column::Weight(index))?
+        }
         E::Stroke => {
             let j = own()?;
             let (from, to) = b.travel[j].filter(|(from, to)| to > from).ok_or(Unbound::NoTravel)?;
@@ -339,6 +351,7 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
         E::Sign(e) => function(Function::Sign, e, memories)?,
         E::Positive(e) => function(Function::Positive, e, memories)?,
         E::Step(e) => function(Function::Step, e, memories)?,
+        E::Saturate(e) => function(Function::Saturate, e, memories)?,
         E::Bump(e) => function(Function::Bump, e, memories)?,
         E::Chebyshev(order, e) => Node::Chebyshev(*order, Box::new(bind(e, b, memories)?)),
         E::Between(e, from, to) => Node::Between(Box::new(bind(e, b, memories)?), *from, *to),
@@ -435,6 +448,7 @@ fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression 
                 Column::Travelled => E::Travelled,
                 Column::Gravity => E::Gravity,
                 Column::Load => E::Load,
+                Column::Weight(index) => weights::expression(machine, *j, *index),
             },
         ),
         Node::Time(since) => E::TimeSince(*since),
@@ -453,6 +467,7 @@ fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression 
                 Function::Sign => E::Sign(e),
                 Function::Positive => E::Positive(e),
                 Function::Step => E::Step(e),
+                Function::Saturate => E::Saturate(e),
                 Function::Bump => E::Bump(e),
             }
         }

@@ -89,6 +89,15 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
             JointKind::Prismatic => Dimension::FORCE,
             JointKind::Revolute => Dimension::FORCE.times(Dimension::LENGTH),
         }),
+        Moment(n) | Shear(n) if *n > 2 => {
+            Err(fault(format!("direction {n} is none"), "write 0 or 1 for across the axis, 2 for about it"))
+        }
+        Lever(_, n) if *n > 1 => {
+            Err(fault(format!("direction {n} is none"), "write 0 or 1 for the directions across the axis"))
+        }
+        Moment(_) => own().map(|_| Dimension::FORCE.times(Dimension::LENGTH)),
+        Shear(_) => own().map(|_| Dimension::FORCE),
+        Lever(..) => own().map(|_| Dimension::FORCE.times(Dimension::LENGTH)),
         Time | TimeSince(_) => Ok(Dimension::TIME),
         Of(name, e) => {
             let kind = (scope.named)(name).ok_or_else(|| {
@@ -152,6 +161,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
         Turns(e) => pure(e, "[0]", "Turns").map(|_| Dimension::ANGLE),
         Exp(e) => pure(e, "[0]", "Exp"),
         Bump(e) => pure(e, "[0]", "Bump"),
+        Saturate(e) => pure(e, "[0]", "Saturate"),
         Chebyshev(order, e) => {
             if *order > 30 {
                 return Err(fault(format!("Chebyshev order {order} is above 30"), "use a lower order"));

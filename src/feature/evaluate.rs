@@ -315,6 +315,7 @@ impl JointSamples {
             Column::Travelled => &self.travelled,
             Column::Gravity => &self.gravity,
             Column::Load => &self.load,
+            Column::Weight(index) => self.weights.get(index).map_or(&[], Vec::as_slice),
         }
     }
 }
@@ -340,6 +341,7 @@ fn function<S: Scalar>(f: Function, x: S) -> S {
         Function::Sign => x.select_below(0.0, number(-1.0), (-x).select_below(0.0, number(1.0), number(0.0))),
         Function::Positive => clip(x),
         Function::Step => x.select_below(0.0, number(0.0), number(1.0)),
+        Function::Saturate => x * (x * x).offset(1.0).sqrt().recip(),
         Function::Bump => vanishing((x * x).scale(-0.5)),
     }
 }

@@ -31,6 +31,15 @@ pub enum Expression {
     Gravity,
     /// The same of 1 kg at the end of the branch.
     Load,
+    /// Moment by gravity of what `Gravity` counts, about the origin of the own joint's frame as it stands before the joint: about the
+    /// first (0) or second (1) direction across the joint's axis, or about the axis (2).
+    Moment(u8),
+    /// How `Moment` of that number changes with each metre by which its point is moved along the joint's axis.
+    Shear(u8),
+    /// Torque on the own joint by a first moment of mass of 1 kg m, fixed to what a joint beyond moves: of the first number, counted
+    /// from the own joint 0, along the first (0) or second (1) direction across its axis. Of a linear joint beyond, that of 1 kg which it
+    /// moves away (0). Masses that nobody knows add to a torque by such numbers alone.
+    Lever(u8, u8),
     /// Time since the first sample of all, s.
     Time,
     /// Where the time stands within the time seen, from -1 to 1.
@@ -69,6 +78,8 @@ pub enum Expression {
     Positive(Box<Expression>),
     /// 1 where the value is 0 or more, else 0.
     Step(Box<Expression>),
+    /// `u/√(1+u²)` of a pure number: -1 to 1, a sign that turns gradually.
+    Saturate(Box<Expression>),
     /// `exp(-u²/2)` of a pure number.
     Bump(Box<Expression>),
     /// Chebyshev polynomial of this order of a pure number, meant for -1 to 1.
@@ -108,13 +119,14 @@ impl Expression {
             | Sign(e)
             | Positive(e)
             | Step(e)
+            | Saturate(e)
             | Bump(e)
             | Between(e, ..)
             | Play(e)
             | TakeUp(e) => vec![(&**e, "[0]".into())],
             Number(_) | Value(..) | Parameter(_) | Position | Stroke | Direction | Velocity
-            | Acceleration | SinceReversal | Travelled | Gravity | Load | Time | Clock | Channel(..)
-            | TimeSince(_) => Vec::new(),
+            | Acceleration | SinceReversal | Travelled | Gravity | Load | Moment(_) | Shear(_)
+            | Lever(..) | Time | Clock | Channel(..) | TimeSince(_) => Vec::new(),
         }
     }
 

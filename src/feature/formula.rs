@@ -5,7 +5,8 @@ use std::fmt;
 use super::Expression;
 
 /// `-0.5 σ`, `sin(2π x/period)`: `x` position, `s` place within the travel seen, `σ` direction of travel, `v`, `a` velocity and
-/// acceleration, `d` distance since the last reversal, `D` path, `τ` load by gravity, `τ₁` load of 1 kg at the end, `t` time, `u`
+/// acceleration, `d` distance since the last reversal, `D` path, `τ` load by gravity, `τ₁` load of 1 kg at the end, `M`
+/// and `Q` moment by gravity and how it changes along the axis, `λ` load of a first moment of 1 kg m, `t` time, `u`
 /// place within the time seen; a prime marks the other joint of a pair.
 impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -71,6 +72,9 @@ fn write(e: &Expression, f: &mut fmt::Formatter<'_>, at_least: u8, mark: &str) -
         Travelled => name(f, "D"),
         Gravity => name(f, "τ"),
         Load => name(f, "τ₁"),
+        Moment(n) => name(f, &format!("M{n}")),
+        Shear(n) => name(f, &format!("Q{n}")),
+        Lever(k, n) => name(f, &format!("λ{k}{n}")),
         Clock => f.write_str("u"),
         Channel(channel, _) => f.write_str(channel),
         Of(joint, e) => write(e, f, at_least, &format!("[{joint}]")),
@@ -106,6 +110,7 @@ fn write(e: &Expression, f: &mut fmt::Formatter<'_>, at_least: u8, mark: &str) -
         Sign(e) => call(f, "sign", e),
         Positive(e) => call(f, "positive", e),
         Step(e) => call(f, "step", e),
+        Saturate(e) => call(f, "saturate", e),
         Bump(e) => call(f, "bump", e),
         Chebyshev(order, e) => call(f, &format!("T{order}"), e),
         Between(e, ..) => call(f, "between", e),

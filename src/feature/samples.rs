@@ -2,17 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use crate::chain::{Chain, Sweep};
+use super::weights::{Weights, gravity_of};
 use crate::error::Result;
 use crate::lie::Vec3;
-use crate::machine::{Branch, Drive, JointKind, Machine};
+use crate::machine::{Drive, Machine};
 use crate::motion::{Axis, LOOK_AHEAD, Rates, stated};
 use crate::recording::{Chunk, Recording};
 
 /// Distance from a reversal that has not been, m or rad: finite, so that derivatives of what decays with it are 0.
 const FAR: f64 = 1e6;
-/// Standard acceleration of gravity, m/s².
-const GRAVITY: f64 = 9.806_65;
 
 /// Consecutive samples of one recording as features see them. All columns have `len` numbers, SI.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,6 +46,9 @@ pub struct JointSamples {
     pub gravity: Vec<f64>,
     /// The same of 1 kg at the end of the branch.
     pub load: Vec<f64>,
+    /// Moments about and across the axis, how they change along it, and torques of first moments beyond: the columns behind
+    /// [`Expression::Moment`](super::Expression::Moment), `Shear` and `Lever`.
+    pub weights: Vec<Vec<f64>>,
 }
 
 impl Samples {
@@ -74,6 +75,7 @@ impl Samples {
             own.acceleration.extend(next.acceleration);
             own.gravity.extend(next.gravity);
             own.load.extend(next.load);
+            own.weights.iter_mut().zip(next.weights).for_each(|(own, next)| own.extend(next));
         }
         for (name, column) in next.channels {
             self.channels.entry(name).or_default().extend(column);
@@ -91,6 +93,7 @@ impl Samples {
             acceleration: f(&joint.acceleration),
             gravity: f(&joint.gravity),
             load: f(&joint.load),
+            weights: joint.weights.iter().map(&f).collect(),
         };
         Samples {
             len,
@@ -113,6 +116,7 @@ impl Samples {
             acceleration: one(&joint.acceleration),
             gravity: one(&joint.gravity),
             load: one(&joint.load),
+            weights: joint.weights.iter().map(one).collect(),
         };
         Samples {
             len: usize::from(k < self.len),
@@ -240,73 +244,12 @@ pub struct FollowOptions {
     pub first_directions: Vec<i8>,
     /// A longer time between two samples is a pause, s.
     pub pause_after: f64,
-    /// Direction of gravity in frame `w`, where the recording states one.
-    pub gravity_w: Option<Vec3<f64>>,
+    /// Direction of gravity in the base frame, [`gravity_of`]; where there is none, that of the machine file.
+    pub gravity_b: Option<Vec3<f64>>,
     /// Names of the extra channels in the order of the chunks.
     pub channels: Vec<String>,
     /// Whether columns `gravity` and `load` are wanted.
     pub with_gravity: bool,
-}
-
-/// The part of [`Follow`] that knows no chunks.
-#[derive(Clone)]
-pub(super) struct Weights {
-    pub(super) chain: Chain<f64>,
-    g_b: Vec3<f64>,
-    /// Mass and its place behind the joint, by dyad; stated and substitute.
-    masses: Vec<Vec<(usize, f64, Vec3<f64>)>>,
-}
-
-impl Weights {
-    pub(super) fn new(machine: &Machine, gravity_w: Option<Vec3<f64>>) -> Self {
-        let chain = Chain::nominal(machine);
-        let home = chain.sweep(&vec![0.0; machine.commands().len()]);
-        let g_b = gravity_w.map_or(machine.gravity_b(), |g_w| home.b_from_w().rotation * g_w);
-        let dyads = machine.dyads();
-        let beyond = |j: usize| {
-            let end =
-                if machine.branch(j) == Branch::Workpiece { machine.workpiece_count() } else { dyads.len() };
-            let stated: Vec<_> = (j..end)
-                .filter_map(|k| dyads[k].mass.map(|m| (k, m.mass, m.centre)))
-                .filter(|m| m.1 > 0.0)
-                .collect();
-            match stated.is_empty() {
-                true => (j + 1..end).map(|k| (k, 1.0, Vec3([0.0; 3]))).collect(),
-                false => stated,
-            }
-        };
-        Weights { chain, g_b: g_b.times(GRAVITY), masses: (0..dyads.len()).map(beyond).collect() }
-    }
-
-    /// Torque or force on the joint of dyad `j`: of the masses beyond, and of 1 kg at the end of the branch.
-    pub(super) fn on(
-        &self,
-        machine: &Machine,
-        sweep: &Sweep<f64>,
-        displacements: &[f64],
-        j: usize,
-    ) -> (f64, f64) {
-        let Some(joint) = &machine.dyads()[j].joint else { return (0.0, 0.0) };
-        let b_from_j = sweep.b_from_frame(j);
-        let n_b = b_from_j.rotation * joint.axis;
-        let moment = |mass: f64, p_b: Vec3<f64>| match joint.kind {
-            JointKind::Prismatic => mass * n_b.dot(self.g_b),
-            JointKind::Revolute => mass * n_b.dot((p_b - b_from_j.translation).cross(self.g_b)),
-        };
-        let place = |k: usize, centre: Vec3<f64>| {
-            let behind = match &machine.dyads()[k].joint {
-                Some(joint) => crate::lie::Pose::exp(joint.twist().times(displacements[k])).transform(centre),
-                None => centre,
-            };
-            sweep.b_from_frame(k).transform(behind)
-        };
-        let gravity = self.masses[j].iter().map(|(k, mass, centre)| moment(*mass, place(*k, *centre))).sum();
-        let end = match machine.branch(j) {
-            Branch::Workpiece => sweep.b_from_w(),
-            Branch::Tool => sweep.b_from_t(),
-        };
-        (gravity, moment(1.0, end.translation))
-    }
 }
 
 impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
@@ -325,7 +268,7 @@ impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
             machine,
             chunks,
             history: History::new(machine, &options.dead_bands, &options.first_directions),
-            weights: options.with_gravity.then(|| Weights::new(machine, options.gravity_w)),
+            weights: options.with_gravity.then(|| Weights::new(machine, options.gravity_b)),
             held: None,
             before: Vec::new(),
             started: false,
@@ -356,13 +299,11 @@ impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
                 columns.travelled.push(self.history.travelled[i]);
             }
             if let Some(weights) = &self.weights {
-                let sweep = sweep.get_or_insert_with(|| weights.chain.sweep(q));
-                weights.chain.sweep_into(q, sweep);
+                let sweep = sweep.get_or_insert_with(|| weights.sweep(q));
+                weights.sweep_into(q, sweep);
                 for (j, columns) in joints.iter_mut().enumerate() {
                     let Some(columns) = columns else { continue };
-                    let (gravity, load) = weights.on(machine, sweep, &displacements, j);
-                    columns.gravity.push(gravity);
-                    columns.load.push(load);
+                    weights.put(machine, sweep, &displacements, j, columns);
                 }
             }
             moved.push(displacements);
@@ -450,7 +391,7 @@ pub fn samples_of(recording: &Recording, machine: &Machine, dead_bands: &[f64]) 
         dead_bands: dead_bands.to_vec(),
         first_directions: first,
         pause_after: recording.scan()?.pause_after.unwrap_or(f64::INFINITY),
-        gravity_w: recording.header().gravity_w,
+        gravity_b: gravity_of(recording, machine, None),
         channels: recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
         with_gravity: true,
     };

@@ -1,6 +1,7 @@
 //! Features along positions that come one by one and are no recording: those of an NC program, or of a simulation.
 
-use super::samples::{History, Weights};
+use super::samples::History;
+use super::weights::Weights;
 use super::{Feature, JointSamples, Memory, Samples};
 use crate::chain::Sweep;
 use crate::machine::Machine;
@@ -45,7 +46,7 @@ impl Walk {
         let memories: Vec<Memory<f64>> = features.iter().map(Memory::new).collect();
         let weights = features.iter().any(Feature::needs_gravity).then(|| {
             let weights = Weights::new(machine, None);
-            let sweep = weights.chain.sweep(&vec![0.0; machine.commands().len()]);
+            let sweep = weights.sweep(&vec![0.0; machine.commands().len()]);
             (weights, sweep)
         });
         let before = Before {
@@ -118,25 +119,27 @@ impl Walk {
         look: impl Fn(usize, usize) -> Look,
     ) -> Samples {
         let mut joints: Vec<Option<JointSamples>> = vec![None; machine.dyads().len()];
+        let displacements = machine.displacements(q);
         let loads = self.weights.as_ref().map(|(weights, sweep)| {
             let mut sweep = sweep.clone();
-            weights.chain.sweep_into(q, &mut sweep);
-            let displacements = machine.displacements(q);
-            (0..joints.len()).map(|j| weights.on(machine, &sweep, &displacements, j)).collect::<Vec<_>>()
+            weights.sweep_into(q, &mut sweep);
+            (weights, sweep)
         });
         for (i, (j, ..)) in self.history.joints.iter().enumerate() {
             let (position, travelled, speeds) = look(i, *j);
-            let load = |pick: fn(&(f64, f64)) -> f64| loads.iter().map(|l| pick(&l[*j])).collect();
-            joints[*j] = Some(JointSamples {
+            let mut columns = JointSamples {
                 position: vec![position],
                 direction: vec![f64::from(self.history.direction(i))],
                 since_reversal: vec![self.history.since_reversal(i, position)],
                 travelled: vec![travelled],
                 velocity: speeds.iter().map(|s| s.0).collect(),
                 acceleration: speeds.iter().map(|s| s.1).collect(),
-                gravity: load(|l| l.0),
-                load: load(|l| l.1),
-            });
+                ..JointSamples::default()
+            };
+            if let Some((weights, sweep)) = &loads {
+                weights.put(machine, sweep, &displacements, *j, &mut columns);
+            }
+            joints[*j] = Some(columns);
         }
         Samples { len: 1, first, time: time.map(|t| vec![t]), joints, channels: Default::default() }
     }

@@ -11,7 +11,7 @@ use super::{
     information, is_of_setup, place, settle,
 };
 use crate::error::Result;
-use crate::feature::{Follow, FollowOptions, Samples, first_directions};
+use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::units::Quantity;
@@ -130,7 +130,7 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[
             dead_bands: bands.to_vec(),
             first_directions: first_directions(machine, bands, source.recording.chunks()?)?,
             pause_after: source.summary.pause_after.unwrap_or(f64::INFINITY),
-            gravity_w: source.recording.header().gravity_w,
+            gravity_b: gravity_of(source.recording, machine, Some(unknowns.setups[source.setup].pose())),
             channels: source.recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
             with_gravity: true,
         };

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 
 use super::stretch::{Beginning, Memories, Stretch, stretches};
 use crate::error::Result;
-use crate::lie::Vec3;
+use crate::feature::{Feature, gravity_of};
+use crate::lie::{Pose, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::recording::{Measurement, NominalLength, Recording, Summary, ToolPoint};
 use crate::sensor::Sensor;
@@ -190,13 +191,37 @@ impl<'a> Sources<'a> {
             }
         }
         if samples <= CACHED_SAMPLES {
-            let mut memories = Memories::new(varying);
-            for source in &mut sources.all {
-                let stretches = source.stretches(machine, varying, &sources.dead_bands, &mut memories)?;
-                source.cached = Some(stretches.collect::<Result<_>>()?);
-            }
+            sources.cache()?;
         }
         Ok(sources)
+    }
+
+    /// Keeps all samples with their features in memory.
+    fn cache(&mut self) -> Result<()> {
+        let mut memories = Memories::new(self.varying);
+        for source in &mut self.all {
+            let stretches = source.stretches(self.machine, self.varying, &self.dead_bands, &mut memories)?;
+            source.cached = Some(stretches.collect::<Result<_>>()?);
+        }
+        Ok(())
+    }
+
+    /// Whether some feature depends on what weighs.
+    pub fn has_weight(&self) -> bool {
+        self.varying.features().any(Feature::needs_gravity)
+    }
+
+    /// Takes features anew, gravity being what recordings state in frame `w`, which stands there before it, by set-up.
+    pub fn turn_gravity(&mut self, previous_from_w: impl Fn(usize) -> Pose<f64>) -> Result<()> {
+        for source in &mut self.all {
+            let Some(beginning) = &mut source.beginning else { continue };
+            let pose = previous_from_w(source.setup);
+            beginning.gravity_b = gravity_of(source.recording, self.machine, Some(pose));
+        }
+        if self.all.iter().any(|s| s.cached.is_some()) {
+            self.cache()?;
+        }
+        Ok(())
     }
 
     /// Keeps `count` samples of each piece for the fit, evenly spread over all recordings, and holds the others out. `piece` tells

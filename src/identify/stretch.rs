@@ -1,7 +1,8 @@
 //! Consecutive samples with all that a model may depend on.
 
 use crate::error::Result;
-use crate::feature::{Feature, Follow, FollowOptions, Memory, first_directions};
+use crate::feature::{Feature, Follow, FollowOptions, Memory, first_directions, gravity_of};
+use crate::lie::Vec3;
 use crate::machine::Machine;
 use crate::motion::{FirstDirections, Motion, Tracker};
 use crate::recording::{Chunk, Recording};
@@ -45,13 +46,15 @@ impl Stretch {
     }
 }
 
-/// How the path of one recording begins.
+/// How the path of one recording begins, and in which direction things weigh.
 #[derive(Clone, Debug)]
 pub(crate) struct Beginning {
     /// Directions of the first motion by command.
     commands: Vec<i8>,
     /// The same by dyad; empty where there are no features.
     dyads: Vec<i8>,
+    /// Direction of gravity in the base frame, where it is not that of the machine file.
+    pub gravity_b: Option<Vec3<f64>>,
 }
 
 impl Beginning {
@@ -73,7 +76,7 @@ impl Beginning {
         } else {
             first_directions(machine, &by_dyad(machine, dead_bands), recording.chunks()?)?
         };
-        Ok(Beginning { commands: first.found(), dyads })
+        Ok(Beginning { commands: first.found(), dyads, gravity_b: gravity_of(recording, machine, None) })
     }
 }
 
@@ -124,7 +127,7 @@ pub(crate) fn stretches<'a>(
         dead_bands: by_dyad(machine, dead_bands),
         first_directions: beginning.dyads.clone(),
         pause_after: pause_after.unwrap_or(f64::INFINITY),
-        gravity_w: recording.header().gravity_w,
+        gravity_b: beginning.gravity_b,
         channels: recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
         with_gravity: varying.features().any(Feature::needs_gravity),
     };

@@ -90,3 +90,20 @@ impl From<Vec3<f64>> for nalgebra::Vector3<f64> {
         nalgebra::Vector3::new(v.0[0], v.0[1], v.0[2])
     }
 }
+
+impl Vec3<f64> {
+    /// Two unit vectors that stand square to this one and to each other; those of the frame where they do.
+    pub fn across(self) -> [Self; 2] {
+        let basis = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3);
+        let largest = (0..3).max_by(|a, b| self.0[*a].abs().total_cmp(&self.0[*b].abs())).unwrap_or(2);
+        let first = basis[if largest == 0 { 1 } else { 0 }];
+        let first = first - self.times(self.dot(first));
+        let first = first.times(first.norm().recip());
+        let mut second = self.cross(first);
+        // With the sign of the frame's own vector.
+        if second.0.iter().fold(0.0f64, |m, x| if x.abs() > m.abs() { *x } else { m }) < 0.0 {
+            second = -second;
+        }
+        [first, second]
+    }
+}

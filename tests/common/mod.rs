@@ -1,6 +1,8 @@
 //! What several tests need.
 #![allow(dead_code)]
 
+pub mod sets;
+
 use std::path::{Path, PathBuf};
 
 use kincal::Machine;
