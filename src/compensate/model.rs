@@ -1,5 +1,7 @@
 //! What compensation asks of a calibrated machine: the kinematics that hold behind each commanded position.
 
+use std::rc::Rc;
+
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
 use crate::error::{Error, Result};
@@ -12,8 +14,9 @@ use crate::variation::Directions;
 /// Errors may depend on how a position was reached. A model keeps what that takes (directions of travel with
 /// a dead band, play); standing still changes nothing.
 pub trait Model {
-    /// Takes the next commanded position into account, m or rad, machine order.
-    fn advance(&mut self, commands: &[f64]);
+    /// Takes the next commanded position into account, m or rad, machine order. `ways`: whether it is known from where each command
+    /// comes there; where it is not, no direction of travel follows.
+    fn advance(&mut self, commands: &[f64], ways: &[bool]);
 
     /// The chain that holds at the position last told.
     fn chain(&self) -> &Chain<f64>;
@@ -32,8 +35,22 @@ pub trait Model {
     /// Whether a commanded position lies beyond what the calibration has seen.
     fn extrapolates(&self, commands: &[f64]) -> bool;
 
-    /// Forgets every position told, as at the start of a program.
-    fn restart(&mut self);
+    /// Forgets every position told, as at the start of a program. `first`: direction of the first motion of each command, which holds
+    /// before it; 0 where that is not known.
+    fn restart(&mut self, first: &[i8]);
+
+    /// A copy that stands where this one does, to be told what lies ahead.
+    fn ahead(&self) -> Box<dyn Model + '_>;
+
+    /// Commands whose direction of travel counts.
+    fn keyed(&self) -> &[usize] {
+        &[]
+    }
+
+    /// Directions of travel of all commands at the position last told, 0 where not known; empty where no direction counts.
+    fn directions(&self) -> Vec<i8> {
+        Vec::new()
+    }
 
     /// Deviations that may be there as well, as [`CalibratedMachine::unseen`].
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
@@ -54,17 +71,18 @@ pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Result<Box<dyn Model
     }
     Ok(match &varying.directions {
         Some(directions) => Box::new(Pieces::new(calibrated, directions)),
-        None => Box::new(Constant { calibrated, chain: calibrated.chain() }),
+        None => Box::new(Constant { calibrated, chain: Rc::new(calibrated.chain()) }),
     })
 }
 
 /// One set of deviations for each pattern of directions of travel.
 ///
-/// An axis that has not moved yet has no direction: the mean of both holds for it.
+/// An axis without known direction has the mean of both.
+#[derive(Clone)]
 struct Pieces<'a> {
     calibrated: &'a CalibratedMachine,
     directions: &'a Directions,
-    chains: Vec<Chain<f64>>,
+    chains: Rc<[Chain<f64>]>,
     tracker: Tracker,
     piece: usize,
 }
@@ -82,21 +100,20 @@ impl<'a> Pieces<'a> {
             calibrated,
             directions,
             chains: (0..directions.piece_count()).map(chain).collect(),
-            tracker: at_rest(calibrated),
+            tracker: at_rest(calibrated, &vec![0; machine.commands().len()]),
             piece: directions.piece(&vec![0; machine.commands().len()]),
         }
     }
 }
 
 /// Nothing has moved yet.
-fn at_rest(calibrated: &CalibratedMachine) -> Tracker {
-    let bands = calibrated.variation().dead_bands.clone();
-    let first = vec![0; bands.len()];
-    Tracker::new(bands, first)
+fn at_rest(calibrated: &CalibratedMachine, first: &[i8]) -> Tracker {
+    Tracker::new(calibrated.variation().dead_bands.clone(), first.to_vec())
 }
 
 impl Model for Pieces<'_> {
-    fn advance(&mut self, commands: &[f64]) {
+    fn advance(&mut self, commands: &[f64], ways: &[bool]) {
+        (0..commands.len()).filter(|c| !ways[*c]).for_each(|c| self.tracker.lose(c));
         self.tracker.advance(commands, |_| None);
         self.piece = self.directions.piece(&self.tracker.directions());
     }
@@ -123,9 +140,21 @@ impl Model for Pieces<'_> {
         self.calibrated.extrapolates(commands)
     }
 
-    fn restart(&mut self) {
-        self.tracker = at_rest(self.calibrated);
-        self.piece = self.directions.piece(&self.tracker.directions());
+    fn restart(&mut self, first: &[i8]) {
+        self.tracker = at_rest(self.calibrated, first);
+        self.piece = self.directions.piece(first);
+    }
+
+    fn ahead(&self) -> Box<dyn Model + '_> {
+        Box::new(self.clone())
+    }
+
+    fn keyed(&self) -> &[usize] {
+        self.directions.axes()
+    }
+
+    fn directions(&self) -> Vec<i8> {
+        self.tracker.directions()
     }
 
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
@@ -138,13 +167,14 @@ fn is_zero(deviations: &[Twist<f64>]) -> bool {
 }
 
 /// One set of deviations everywhere.
+#[derive(Clone)]
 struct Constant<'a> {
     calibrated: &'a CalibratedMachine,
-    chain: Chain<f64>,
+    chain: Rc<Chain<f64>>,
 }
 
 impl Model for Constant<'_> {
-    fn advance(&mut self, _: &[f64]) {}
+    fn advance(&mut self, _: &[f64], _: &[bool]) {}
 
     fn chain(&self) -> &Chain<f64> {
         &self.chain
@@ -162,7 +192,11 @@ impl Model for Constant<'_> {
         self.calibrated.extrapolates(commands)
     }
 
-    fn restart(&mut self) {}
+    fn restart(&mut self, _: &[i8]) {}
+
+    fn ahead(&self) -> Box<dyn Model + '_> {
+        Box::new(self.clone())
+    }
 
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
         self.calibrated.unseen()
