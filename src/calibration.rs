@@ -14,8 +14,10 @@ use crate::machine::{JointKind, Machine, MachineFault, MachineForm, Placement, a
 
 use crate::rms::Rms;
 use crate::variation::Variation;
+use error_motions::MotionForm;
 use pieces::PiecesForm;
 
+mod error_motions;
 mod pieces;
 
 pub(crate) type Triple = (f64, f64, f64);
@@ -43,6 +45,8 @@ pub(crate) struct CalibrationForm {
     seen: Vec<SeenForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pieces: Option<PiecesForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    error_motions: Vec<MotionForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     unseen: Option<Vec<Vec<DeviationForm>>>,
 }
@@ -302,6 +306,7 @@ impl CalibratedMachine {
         if let Some(pieces) = &form.pieces {
             self.variation = pieces.read(&self.machine)?;
         }
+        self.variation.motions = error_motions::read(&form.error_motions, &self.machine)?;
         self.samples = form.samples;
         self.rms = Rms {
             m: form.rms_length.map(|x| units.length.to_si(x)),
@@ -365,6 +370,7 @@ impl CalibratedMachine {
                 .collect(),
             seen: seen.collect(),
             pieces: PiecesForm::of(&self.machine, &self.variation),
+            error_motions: error_motions::forms(&self.machine, &self.variation.motions),
             unseen,
         });
         to_text(&form)

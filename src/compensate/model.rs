@@ -71,11 +71,33 @@ pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Result<Box<dyn Model
     }
     Ok(match &varying.directions {
         Some(directions) => Box::new(Pieces::new(calibrated, directions)),
-        None => Box::new(Constant { calibrated, chain: Rc::new(calibrated.chain()) }),
+        None => Box::new(Constant { calibrated, chain: Rc::new(calibrated.chain()), bent: None }),
     })
 }
 
-/// One set of deviations for each pattern of directions of travel.
+/// The chain of these deviations with the error motions at the commands `q`; `None` where there are no error motions.
+fn bent(
+    calibrated: &CalibratedMachine,
+    dh: impl FnOnce() -> Vec<Twist<f64>>,
+    q: &[f64],
+    directions: &[i8],
+) -> Option<Chain<f64>> {
+    let motions = &calibrated.variation().motions;
+    if motions.is_empty() {
+        return None;
+    }
+    let mut dh = dh();
+    motions.add(calibrated.machine(), q, directions, &mut dh);
+    Some(Chain::new(calibrated.machine(), &dh))
+}
+
+/// Constant and direction part of every dyad in a piece.
+fn of_piece(calibrated: &CalibratedMachine, piece: usize) -> Vec<Twist<f64>> {
+    let parts = calibrated.variation().direction_part(piece, calibrated.deviations().len());
+    calibrated.deviations().iter().zip(&parts).map(|(dh, part)| *dh + *part).collect()
+}
+
+/// One set of deviations for each pattern of directions of travel, and error motions where they are known.
 ///
 /// An axis without known direction has the mean of both.
 #[derive(Clone)]
@@ -83,6 +105,8 @@ struct Pieces<'a> {
     calibrated: &'a CalibratedMachine,
     directions: &'a Directions,
     chains: Rc<[Chain<f64>]>,
+    /// With the error motions at the position last told.
+    bent: Option<Chain<f64>>,
     tracker: Tracker,
     piece: usize,
 }
@@ -90,18 +114,15 @@ struct Pieces<'a> {
 impl<'a> Pieces<'a> {
     fn new(calibrated: &'a CalibratedMachine, directions: &'a Directions) -> Self {
         let machine = calibrated.machine();
-        let chain = |piece: usize| {
-            let parts = calibrated.variation().direction_part(piece, machine.dyads().len());
-            let dh: Vec<Twist<f64>> =
-                calibrated.deviations().iter().zip(&parts).map(|(dh, part)| *dh + *part).collect();
-            Chain::new(machine, &dh)
-        };
+        let still = vec![0; machine.commands().len()];
+        let chain = |piece: usize| Chain::new(machine, &of_piece(calibrated, piece));
         Pieces {
             calibrated,
             directions,
             chains: (0..directions.piece_count()).map(chain).collect(),
-            tracker: at_rest(calibrated, &vec![0; machine.commands().len()]),
-            piece: directions.piece(&vec![0; machine.commands().len()]),
+            bent: None,
+            tracker: at_rest(calibrated, &still),
+            piece: directions.piece(&still),
         }
     }
 }
@@ -115,11 +136,13 @@ impl Model for Pieces<'_> {
     fn advance(&mut self, commands: &[f64], ways: &[bool]) {
         (0..commands.len()).filter(|c| !ways[*c]).for_each(|c| self.tracker.lose(c));
         self.tracker.advance(commands, |_| None);
-        self.piece = self.directions.piece(&self.tracker.directions());
+        let directions = self.tracker.directions();
+        self.piece = self.directions.piece(&directions);
+        self.bent = bent(self.calibrated, || of_piece(self.calibrated, self.piece), commands, &directions);
     }
 
     fn chain(&self) -> &Chain<f64> {
-        &self.chains[self.piece]
+        self.bent.as_ref().unwrap_or(&self.chains[self.piece])
     }
 
     fn piece(&self) -> usize {
@@ -134,6 +157,7 @@ impl Model for Pieces<'_> {
     fn is_nominal(&self) -> bool {
         is_zero(self.calibrated.deviations())
             && self.calibrated.variation().parts.iter().all(|part| is_zero(part))
+            && self.calibrated.variation().motions.is_empty()
     }
 
     fn extrapolates(&self, commands: &[f64]) -> bool {
@@ -143,6 +167,7 @@ impl Model for Pieces<'_> {
     fn restart(&mut self, first: &[i8]) {
         self.tracker = at_rest(self.calibrated, first);
         self.piece = self.directions.piece(first);
+        self.bent = None;
     }
 
     fn ahead(&self) -> Box<dyn Model + '_> {
@@ -171,13 +196,17 @@ fn is_zero(deviations: &[Twist<f64>]) -> bool {
 struct Constant<'a> {
     calibrated: &'a CalibratedMachine,
     chain: Rc<Chain<f64>>,
+    /// With the error motions at the position last told.
+    bent: Option<Chain<f64>>,
 }
 
 impl Model for Constant<'_> {
-    fn advance(&mut self, _: &[f64], _: &[bool]) {}
+    fn advance(&mut self, commands: &[f64], _: &[bool]) {
+        self.bent = bent(self.calibrated, || self.calibrated.deviations().to_vec(), commands, &[]);
+    }
 
     fn chain(&self) -> &Chain<f64> {
-        &self.chain
+        self.bent.as_ref().unwrap_or(&self.chain)
     }
 
     fn piece(&self) -> usize {
@@ -185,14 +214,16 @@ impl Model for Constant<'_> {
     }
 
     fn is_nominal(&self) -> bool {
-        is_zero(self.calibrated.deviations())
+        is_zero(self.calibrated.deviations()) && self.calibrated.variation().motions.is_empty()
     }
 
     fn extrapolates(&self, commands: &[f64]) -> bool {
         self.calibrated.extrapolates(commands)
     }
 
-    fn restart(&mut self, _: &[i8]) {}
+    fn restart(&mut self, _: &[i8]) {
+        self.bent = None;
+    }
 
     fn ahead(&self) -> Box<dyn Model + '_> {
         Box::new(self.clone())

@@ -153,6 +153,12 @@ pub enum MachineFault {
         /// What is wrong.
         what: String,
     },
+    /// An error motion of a calibration that is none.
+    #[error("{what}")]
+    BadErrorMotion {
+        /// What is wrong.
+        what: String,
+    },
 }
 
 impl MachineFault {
@@ -198,6 +204,7 @@ impl MachineFault {
             NoJoint => "a machine needs a joint: (frame: \"x\", joint: Prismatic(axis: \"x\"))".into(),
             UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
             BadPieces { .. } => "write the pieces as `calibrate --directions` does".into(),
+            BadErrorMotion { .. } => "write error motions as `calibrate --error-motions` does".into(),
         }
     }
 }
