@@ -15,8 +15,10 @@ use crate::machine::{JointKind, Machine, MachineFault, MachineForm, Placement, a
 use crate::effects::StoredEffect;
 use crate::rms::Rms;
 use crate::variation::Variation;
+use error_motions::MotionForm;
 use pieces::{AxisForm, PiecesForm};
 
+mod error_motions;
 mod named;
 mod pieces;
 
@@ -54,6 +56,7 @@ pub(crate) struct CalibrationForm {
     clock: Option<(f64, f64)>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effects: Vec<StoredEffect>,
+    error_motions: Vec<MotionForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     unseen: Option<Vec<Vec<DeviationForm>>>,
 }
@@ -320,6 +323,7 @@ impl CalibratedMachine {
             self.variation = pieces.read(&self.machine)?;
         }
         self.read_effects(form)?;
+        self.variation.motions = error_motions::read(&form.error_motions, &self.machine)?;
         self.samples = form.samples;
         self.rms = Rms {
             m: form.rms_length.map(|x| units.length.to_si(x)),
@@ -386,6 +390,7 @@ impl CalibratedMachine {
             dead_bands: self.dead_band_forms(),
             clock: self.clock,
             effects: self.effects.clone(),
+            error_motions: error_motions::forms(&self.machine, &self.variation.motions),
             unseen,
         });
         to_text(&form)

@@ -42,6 +42,7 @@ mod setup;
 mod straight;
 mod target;
 mod tool;
+mod ways;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -50,8 +51,8 @@ use std::path::Path;
 pub use fault::CompensateFault;
 pub use model::Model;
 pub use report::{
-    Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, Unreached, Unseen, UnseenPattern,
-    Worst,
+    Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, UnknownWay, Unreached, Unseen,
+    UnseenPattern, Worst,
 };
 pub use setup::{Setup, ToolAxis};
 
@@ -141,7 +142,8 @@ pub fn compensate_with(
     Ok((out, report))
 }
 
-/// One pass over the program, or two where it has sub-programs: their lines are found first.
+/// One pass over the program behind a look for sub-programs; one more before it where directions of travel count, as far as the first
+/// motion of each axis, and one where there are sub-programs, for what their lines need.
 fn run<R: BufRead>(
     machine: &Machine,
     model: &mut dyn Model,
@@ -169,25 +171,35 @@ fn run<R: BufRead>(
             calls.add(&name, &block);
         }
     }
+    let mut first = vec![0; machine.commands().len()];
+    if !model.keyed().is_empty() {
+        let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
+        follower.scouting = true;
+        // What is wrong with the program is told when it is corrected.
+        let _ = follow(&mut follower, &mut open()?, &mut calls, &mut std::io::sink());
+        first = follower.ways.first;
+    }
     if !calls.is_empty() {
         calls.collecting = true;
-        pass(machine, model, &mut open()?, setup, options, &mut calls, &mut std::io::sink())?;
+        let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
+        follow(&mut follower, &mut open()?, &mut calls, &mut std::io::sink())?;
         calls.collecting = false;
     }
-    pass(machine, model, &mut open()?, setup, options, &mut calls, out)
+    let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
+    let blocks = follow(&mut follower, &mut open()?, &mut calls, out)?;
+    let mut report = follower.finish();
+    report.blocks = blocks;
+    Ok(report)
 }
 
-fn pass<R: BufRead>(
-    machine: &Machine,
-    model: &mut dyn Model,
+/// One pass; how many blocks there are.
+fn follow<R: BufRead>(
+    follower: &mut Follower,
     program: &mut Program<R>,
-    setup: &Setup,
-    options: &Options,
     calls: &mut Calls,
     out: &mut dyn Write,
-) -> Result<Report> {
+) -> Result<u64> {
     let dialect = program.dialect();
-    let mut follower = Follower::new(machine, model, setup, options, dialect);
     let mut bounds = Bounds::default();
     let mut blocks = 0;
     while let Some(mut block) = program.next_block()? {
@@ -195,12 +207,13 @@ fn pass<R: BufRead>(
         if bounds.of(&block, dialect).is_some() {
             calls.write(&block, out)?;
         } else {
-            calls.block(&mut follower, &mut block, 0, out)?;
+            calls.block(follower, &mut block, 0, out)?;
+        }
+        if follower.scouting && follower.ways.found(follower.model) {
+            break;
         }
     }
-    let mut report = follower.finish();
-    report.blocks = blocks;
-    Ok(report)
+    Ok(blocks)
 }
 
 /// A machine without errors: the program as it is.

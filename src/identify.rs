@@ -77,8 +77,8 @@ pub struct Model {
     pub dead_bands: Vec<Option<f64>>,
     /// As many samples of each piece are used, evenly spread; the others judge the result.
     pub samples: Option<u64>,
-    /// Room for smooth error motions of every joint, over the tolerance of its dyad, `docs/model.md` (32); 0 for none. They are no part
-    /// of the model, but do not bend it either.
+    /// Room for smooth error motions of every joint, over the tolerance of its dyad, `docs/model.md` (32); 0 for none. They do
+    /// not bend the deviations, and are kept beside them.
     pub error_motions: f64,
 }
 
@@ -148,7 +148,7 @@ pub fn calibrate_model(
     problem.prior = prior;
     problem.free = vec![true; layout.len];
     if prior {
-        problem.motions = Motions::new(machine, &sources, model.error_motions);
+        problem.motions = Motions::new(machine, &sources, model.error_motions, varying.directions.as_ref());
     }
     let mut found = settle(&problem, options.solver, placed.unknowns, noise)?;
     let fitting = |but_play: f64| Layout::new(machine, &sources, varying, but_play);
@@ -171,8 +171,9 @@ pub fn calibrate_model(
     calibrated.unseen = Some(unseen::unseen(machine, &layout, &information));
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
     let unknowns = &found.solution.unknowns;
-    if !varying.is_constant() {
+    if !varying.is_constant() || problem.motions.len() > 0 {
         calibrated = calibrated.with_variation(Variation {
+            motions: problem.motions.found(&unknowns.motions),
             varying: varying.clone(),
             parts: unknowns.parts.clone(),
             coefficients: unknowns.coefficients.clone(),
@@ -362,10 +363,7 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
     let mut seen = noise.clone();
     for _ in 0..NOISE_ROUNDS {
         seen = noise_left(problem, &solution.normal, &noise);
-        let mut next = with_stated(problem.sources, &seen);
-        if problem.motions.len() > 0 {
-            next.iter_mut().for_each(Noise::count_half);
-        }
+        let next = with_stated(problem.sources, &seen);
         let changed = noise.iter().zip(&next).any(|(a, b)| {
             let differs = |x: f64, y: f64| (x - y).abs() > 3e-3 * y;
             differs(a.length, b.length) || differs(a.angle, b.angle)

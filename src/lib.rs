@@ -82,6 +82,7 @@ pub mod diagnose;
 mod document;
 pub mod effects;
 pub mod error;
+pub mod error_motion;
 pub mod feature;
 pub mod identify;
 pub mod inverse;

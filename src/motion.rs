@@ -77,6 +77,15 @@ impl Tracker {
         self.axes.iter().zip(&self.first).map(now).collect()
     }
 
+    /// Forgets where command `c` stands, as when it has gone a way that is not known. What held before its first motion still does; later
+    /// it has no direction until it moves again.
+    pub fn lose(&mut self, c: usize) {
+        if self.axes[c].is_some_and(|axis| axis.direction != 0) {
+            self.first[c] = 0;
+        }
+        self.axes[c] = None;
+    }
+
     /// Moves on to the commands `q` (m or rad). `stated`: directions of approach from `<joint>_direction` columns; 0 and
     /// `None` leave the direction to the motion.
     pub fn advance(&mut self, q: &[f64], stated: impl Fn(usize) -> Option<i8>) {
@@ -251,6 +260,20 @@ mod tests {
         first.look(&chunk);
         let motion = Tracker::new(vec![0.0], first.found()).follow(&chunk);
         assert_eq!(motion.directions, [-1, -1, -1, 1]);
+    }
+
+    #[test]
+    fn a_way_that_is_not_known_gives_no_direction() {
+        let mut tracker = Tracker::new(vec![0.0], vec![-1]);
+        let mut told = Vec::new();
+        for (q, known) in [(5.0, true), (9.0, false), (8.0, true), (9.0, true), (0.0, false), (1.0, true)] {
+            if !known {
+                tracker.lose(0);
+            }
+            tracker.advance(&[q], |_| None);
+            told.extend(tracker.directions());
+        }
+        assert_eq!(told, [-1, -1, -1, 1, 0, 1]);
     }
 
     #[test]

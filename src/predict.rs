@@ -110,6 +110,7 @@ pub fn predict(
         parts: &variation.parts,
         terms: &variation.varying.terms,
         coefficients: &variation.coefficients,
+        motions: &variation.motions,
     };
     let evaluator = Evaluator::with(machine, &sensor, state, previous_from_w, &dh, values);
     let varying = &variation.varying;

@@ -3,6 +3,7 @@
 //! To `dh_j` of (10) comes what changes with the directions of travel of some axes, [`Directions`] and (29), and a sum of
 //! coefficients times features, [`Term`] and (30). Equations: `docs/model.md`.
 
+use crate::error_motion::ErrorMotions;
 use crate::feature::Feature;
 use crate::lie::Twist;
 use crate::machine::Machine;
@@ -77,6 +78,8 @@ pub struct Variation {
     pub dead_bands: Vec<f64>,
     /// Samples that each piece was found from, by piece.
     pub samples: Vec<u64>,
+    /// Error motions of the axes, where room was left for them.
+    pub motions: ErrorMotions,
 }
 
 impl Variation {
@@ -200,11 +203,20 @@ impl Directions {
         names.join(" and ")
     }
 
+    /// Standard deviation of half the play of the joint of dyad `j`, m or rad; `None` where no axis of these drives it alone.
+    pub fn play(&self, machine: &Machine, j: usize) -> Option<f64> {
+        let set =
+            self.sets.iter().position(|set| matches!(set[..], [i] if drives(machine, self.axes[i], j)))?;
+        let along = machine.dyads()[j].joint.as_ref()?.twist().to_array();
+        let tolerance = self.tolerance(machine, set, j, 0.0);
+        Some(along.iter().zip(tolerance).map(|(xi, t)| xi.abs() * t).fold(0.0, f64::max))
+    }
+
     /// Standard deviation of the part of `set` on dyad `j`, m and rad; `but_play` is a factor on everything but play.
     pub fn tolerance(&self, machine: &Machine, set: usize, j: usize, but_play: f64) -> [f64; 6] {
         let tolerance = machine.tolerance(j).to_array();
         let own = match self.sets[set][..] {
-            [i] => machine.drive(j).is_some_and(|d| matches!(d.terms[..], [(c, _)] if c == self.axes[i])),
+            [i] => drives(machine, self.axes[i], j),
             _ => false,
         };
         let xi = match &machine.dyads()[j].joint {
@@ -217,6 +229,11 @@ impl Directions {
             tolerance[k] * (ALONG * share).hypot(but_play * ACROSS * (1.0 - share * share).max(0.0).sqrt())
         })
     }
+}
+
+/// Whether command `c` alone drives the joint of dyad `j`.
+fn drives(machine: &Machine, c: usize, j: usize) -> bool {
+    machine.drive(j).is_some_and(|drive| matches!(drive.terms[..], [(own, _)] if own == c))
 }
 
 #[cfg(test)]

@@ -329,26 +329,27 @@ fn other_controls_are_written_in_their_own_way() {
 }
 
 /// Deviations for a growing first joint and others for a shrinking one.
+#[derive(Clone)]
 struct TwoPieces {
     chains: [Chain<f64>; 2],
     last: Option<f64>,
-    piece: usize,
+    direction: i8,
 }
 
 impl Model for TwoPieces {
-    fn advance(&mut self, commands: &[f64]) {
-        if let Some(last) = self.last
+    fn advance(&mut self, commands: &[f64], ways: &[bool]) {
+        if let Some(last) = self.last.filter(|_| ways[0])
             && (commands[0] - last).abs() > 1e-9
         {
-            self.piece = usize::from(commands[0] < last);
+            self.direction = if commands[0] < last { -1 } else { 1 };
         }
         self.last = Some(commands[0]);
     }
     fn chain(&self) -> &Chain<f64> {
-        &self.chains[self.piece]
+        &self.chains[self.piece()]
     }
     fn piece(&self) -> usize {
-        self.piece
+        usize::from(self.direction < 0)
     }
     fn is_nominal(&self) -> bool {
         false
@@ -356,25 +357,23 @@ impl Model for TwoPieces {
     fn extrapolates(&self, _: &[f64]) -> bool {
         false
     }
-    fn restart(&mut self) {
-        (self.last, self.piece) = (None, 0);
+    fn restart(&mut self, first: &[i8]) {
+        (self.last, self.direction) = (None, first[0]);
+    }
+    fn ahead(&self) -> Box<dyn Model + '_> {
+        Box::new(self.clone())
+    }
+    fn keyed(&self) -> &[usize] {
+        &[0]
+    }
+    fn directions(&self) -> Vec<i8> {
+        vec![self.direction; 3]
     }
 }
 
 #[test]
 fn the_step_at_a_reversal_is_told_with_its_line() {
-    let machine = machine("xyz_mill");
-    let first = machine.joints().next().expect("a joint");
-    let dyad = first.0;
-    let along = first.1.axis;
-    let chain = |by: f64| {
-        let mut deviations = vec![Twist::zero(0.0); machine.dyads().len()];
-        deviations[dyad].v = along.times(by);
-        CalibratedMachine::nominal(machine.clone()).with_deviations(deviations).chain()
-    };
-    // Play of 12 um on the first joint.
-    let mut model = TwoPieces { chains: [chain(-6e-6), chain(6e-6)], last: None, piece: 0 };
-    let address = machine.command_joint(0).nc_word().address;
+    let (machine, mut model, address) = with_play();
     let text = "G90 G0 X0 Y0 Z0\nG1 @10 F99\n@20\nG4 P1\nZ1\n@15\n@10\n@12\n".replace('@', &address);
     let (out, report) = compensate_with(
         &machine,
@@ -672,5 +671,88 @@ proptest! {
         if let Err(error) = compensate_text(&calibrated, "any.nc", tokens.join(" "), &setup, &options) {
             prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
         }
+    }
+}
+
+#[test]
+fn an_arc_names_the_axes_that_it_needs_or_is_refused() {
+    let calibrated = erroneous("ac_table_tilting", 1.0);
+    let (machine, actual) = (calibrated.machine(), calibrated.chain());
+    let text = "G21 G90\nG0 X30 Y0 A40 C10\nG1 X31 F800\nX30\nG3 X0 Y30 I-30 J0 F800\n";
+    let options = Options { arcs: Some(1e-5), ..Options::default() };
+    // Z stands somewhere, and no word says where.
+    let refused =
+        compensate_text(&calibrated, "part.nc", text, &Setup::default(), &options).expect_err("no Z");
+    let told = format!("{refused} | {}", refused.mend());
+    assert!(told.starts_with("part.nc:5:1: ") && told.contains("has not placed Z before it"), "{told}");
+    assert!(told.contains("start: {\"Z\": ...}"), "{told}");
+    // So it is where Z was only ever sent to a place of the machine.
+    let parked = text.replacen("G0", "G53 G0 Z0\nG0", 1);
+    assert!(compensate_text(&calibrated, "part.nc", parked, &Setup::default(), &options).is_err());
+    // A word elsewhere, or the set-up, says where: the word that is missing in the arc is written.
+    let elsewhere = text.replacen("G1 X31", "G1 X31 Z5", 1);
+    for (text, setup) in [(text, "Setup(start: {\"Z\": 5})"), (elsewhere.as_str(), "Setup()")] {
+        let (out, report) = with_setup(&calibrated, text, setup, &options);
+        assert!(report.split_arcs == 1 && report.largest_arc_m.value <= 1e-5, "{report:?}");
+        let arc: Vec<&str> = out.lines().skip(4).collect();
+        assert!(arc.iter().filter(|line| line.contains('Z')).count() > 2, "{out}");
+        let mut sent = targets(&out, &AXES);
+        let end = sent.pop().expect("a move");
+        assert!(tip_error(&actual, machine, &[0.0, 30.0, 5.0, 40.0, 10.0], &end) < 2e-6, "{end:?}");
+    }
+}
+
+/// Play of 12 um on the first joint of `xyz_mill`; its address.
+fn with_play() -> (Machine, TwoPieces, String) {
+    let machine = machine("xyz_mill");
+    let (dyad, along) = machine.joints().next().map(|(j, joint)| (j, joint.axis)).expect("a joint");
+    let chain = |by: f64| {
+        let mut deviations = vec![Twist::zero(0.0); machine.dyads().len()];
+        deviations[dyad].v = along.times(by);
+        CalibratedMachine::nominal(machine.clone()).with_deviations(deviations).chain()
+    };
+    let model = TwoPieces { chains: [chain(-6e-6), chain(6e-6)], last: None, direction: 0 };
+    let address = machine.command_joint(0).nc_word().address;
+    (machine, model, address)
+}
+
+#[test]
+fn the_first_direction_of_an_axis_follows_from_where_it_starts_or_from_its_first_known_way() {
+    let options = Options { arcs: Some(1e-3), ..Options::default() };
+    // By set-up and program (@: the axis): thousandths that are added to its words in turn, and lines with an unknown way.
+    let cases: [(&str, &str, &[i64], &[usize]); 9] = [
+        // Forward from the start, and from the other side.
+        ("start: {\"@\": 0}", "G0 @10\nG1 @20 F9\n", &[6, 6], &[]),
+        ("start: {\"@\": 50}", "G0 @10\nG4 P1\n", &[-6], &[]),
+        ("start: {\"@\": 10}", "G0 @10\nG1 @20 F9\n", &[6, 6], &[]),
+        // From nowhere: the first way between two known places holds before it.
+        ("", "G0 @10\nG1 @10 F9\n@4\n@20\n", &[-6, -6, -6, 6], &[1]),
+        ("", "G0 @10\nG4 P1\nG91 G1 @-2 F9\n", &[-6, 0], &[1]),
+        // From a place of the machine.
+        ("", "G53 G0 @30\nG0 @10\n", &[0, -6], &[]),
+        // From a reference point that the set-up knows, or does not.
+        ("reference: {\"@\": -50}", "G28 @0\nG0 @10\n", &[0, 6], &[]),
+        ("reference: {\"@\": 50}", "G0 @0\nG1 @1 F9\nG28 @0\nG0 @10\n", &[6, 6, 0, -6], &[1]),
+        ("", "G0 @0\nG1 @-1 F9\nG28 @0\nG0 @10\n", &[-6, -6, 0, -6], &[1, 4]),
+    ];
+    for (setup, program, added, unknown) in cases {
+        let (machine, mut model, address) = with_play();
+        let named = |text: &str| text.replace('@', &address);
+        let setup = Setup::parse("setup.ron", &named(&format!("Setup({setup})"))).expect("readable");
+        let text = named(program);
+        let (out, report) =
+            compensate_with(&machine, &mut model, "part.nc", text.as_bytes(), &setup, &options)
+                .unwrap_or_else(|e| panic!("{text}: {e}"));
+        let out = String::from_utf8_lossy(&out).into_owned();
+        let words = |text: &str| -> Vec<f64> {
+            let words = text.split_whitespace().filter_map(|w| w.strip_prefix(address.as_str()));
+            words.map(|w| w.parse().expect("a number")).collect()
+        };
+        let by: Vec<i64> = (words(&out).iter().zip(words(&text)))
+            .map(|(after, before)| ((after - before) * 1e3).round() as i64)
+            .collect();
+        assert_eq!(by, added, "{text}{out}");
+        let lines: Vec<usize> = report.unknown_ways.first.iter().map(|way| way.line).collect();
+        assert_eq!(lines, unknown, "{text}");
     }
 }

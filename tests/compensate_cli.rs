@@ -158,11 +158,12 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
     let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let said = text(&out.stdout);
-    // Where the machine came from before line 2 is not known: the mean of both directions until an axis moves again. 4: C down;
-    // 5: A down; 6: A up; 7: C up, A still as it came.
+    // Where the machine came from before line 2 is not known: the direction of each axis' first motion, C down in line 4 and A down in
+    // line 5, holds before it. 6: A up; 7: C up, A still as it came.
     let parts = [
-        "at 4 blocks where a direction of travel changes",
-        "lines 4, 5, 6, 7",
+        "at 2 blocks where a direction of travel changes",
+        "lines 6, 7",
+        "from where a, c comes at line 2 is not known; taken is the direction of its first motion",
         "at 1 block the axes travel in a pattern of directions that the calibration has not seen (AFCF)",
         "have shown: line 7",
     ];
@@ -172,7 +173,7 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
     let json: serde_json::Value =
         serde_json::from_str(&bench.read("out.json").expect("written")).expect("JSON");
     // A turns round in line 6, with a play of 60 urad.
-    let step = json["reversals"]["first"][2]["step_rad"].as_f64().expect("a number");
+    let step = json["reversals"]["first"][0]["step_rad"].as_f64().expect("a number");
     assert!((step - 60e-6).abs() < 6e-6, "{json}");
     assert_eq!(json["unseen_directions"]["first"][0], serde_json::json!({"line": 7, "piece": "AFCF"}));
 }

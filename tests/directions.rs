@@ -80,8 +80,8 @@ fn directions(path: &[Vec<f64>]) -> Vec<Vec<i8>> {
         .collect()
 }
 
-/// The chain of the model in a pattern of directions.
-fn chain(model: &CalibratedMachine, directions: &[i8]) -> Chain<f64> {
+/// The chain of the model in a pattern of directions at the commands `q`.
+fn chain(model: &CalibratedMachine, directions: &[i8], q: &[f64]) -> Chain<f64> {
     let machine = model.machine();
     let variation = model.variation();
     let mut dh: Vec<Twist<f64>> = model.deviations().to_vec();
@@ -89,6 +89,7 @@ fn chain(model: &CalibratedMachine, directions: &[i8]) -> Chain<f64> {
         let parts = variation.direction_part(keyed.piece(directions), dh.len());
         dh = dh.iter().zip(parts).map(|(a, b)| *a + b).collect();
     }
+    variation.motions.add(machine, q, directions, &mut dh);
     for (term, coefficient) in variation.varying.terms.iter().zip(&variation.coefficients) {
         for part in &term.parts {
             let Slot::Before(j) = part.slot else { panic!("play stands before the joint") };
@@ -102,15 +103,8 @@ fn chain(model: &CalibratedMachine, directions: &[i8]) -> Chain<f64> {
 }
 
 fn predicted(model: &CalibratedMachine, path: &[Vec<f64>]) -> Vec<f64> {
-    let mut known: Vec<(Vec<i8>, Chain<f64>)> = Vec::new();
     (path.iter().zip(directions(path)))
-        .map(|(q, d)| {
-            let at = known.iter().position(|(own, _)| *own == d).unwrap_or_else(|| {
-                known.push((d.clone(), chain(model, &d)));
-                known.len() - 1
-            });
-            known[at].1.w_from_t(q).translation.norm()
-        })
+        .map(|(q, d)| chain(model, &d, q).w_from_t(q).translation.norm())
         .collect()
 }
 
@@ -135,7 +129,7 @@ fn corrected(model: &CalibratedMachine, path: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (path.iter().zip(directions(path)))
         .map(|(q, d)| {
             let wanted = nominal.w_from_t(q);
-            inverse(&chain(model, &d), machine, wanted.translation, wanted.rotation.column(2), q)
+            inverse(&chain(model, &d, q), machine, wanted.translation, wanted.rotation.column(2), q)
                 .expect("reached")
         })
         .collect()
@@ -187,18 +181,10 @@ fn degrees(a: f64) -> f64 {
     a.to_radians()
 }
 
-/// Over five unseen paths together: pieces against unified (median, worst of all tables), and the mean errors of pieces, unified and
-/// unified without room for error motions over that of the best estimator.
-struct Elsewhere {
-    median: f64,
-    worst: f64,
-    to_best: [f64; 3],
-}
-
-/// Trains on three paths and judges on five others, `SEEDS` tables from `first_seed` on.
-fn elsewhere(machine: &Machine, trained: &[Vec<Vec<f64>>; 3], first_seed: u64) -> Elsewhere {
+/// The path that the issue names, and four others.
+fn paths_to_judge_on(machine: &Machine) -> [Vec<Vec<f64>>; 5] {
     let run = |length, bar, angles| path(machine, length, bar, angles, 180);
-    let unseen = [
+    [
         run(0.1, Bar::Machine, Some(|phi| (degrees(45.0 + 30.0 * (2.0 * phi).cos()), phi))),
         run(0.1, Bar::Table, Some(|phi| (degrees(45.0 + 30.0 * (2.0 * phi).cos()), phi))),
         run(0.1, Bar::Machine, Some(|phi| (degrees(40.0 + 30.0 * phi.sin()), 2.0 * phi))),
@@ -208,11 +194,30 @@ fn elsewhere(machine: &Machine, trained: &[Vec<Vec<f64>>; 3], first_seed: u64) -
             Bar::Machine,
             Some(|phi| (degrees(45.0 - 30.0 * phi.cos()), 0.5 * (2.0 * phi).sin() - phi)),
         ),
-    ];
+    ]
+}
+
+/// Over the unseen paths together: pieces against unified (median, worst of all tables), and the mean errors of pieces, unified and
+/// unified without room for error motions over that of the best estimator: over its mean on the same tables, and over what is
+/// expected of it on all tables.
+struct Elsewhere {
+    median: f64,
+    worst: f64,
+    to_best: [f64; 3],
+    to_expected: [f64; 3],
+}
+
+/// Trains on three paths and judges on others, `SEEDS` tables from `first_seed` on.
+fn elsewhere(
+    machine: &Machine,
+    trained: &[Vec<Vec<f64>>; 3],
+    unseen: &[Vec<Vec<f64>>],
+    first_seed: u64,
+) -> Elsewhere {
     let best = Best::new(machine, &trained.each_ref().map(|p| &p[..]));
-    let expected = unseen.each_ref().map(|path| best.expected_error(machine, path) * 1e6);
+    let expected: Vec<f64> = unseen.iter().map(|path| best.expected_error(machine, path) * 1e6).collect();
     // By path: pieces, unified, unified without room for error motions, the best estimator, um.
-    let one = |seed: u64| -> [[f64; 4]; 5] {
+    let one = |seed: u64| -> Vec<[f64; 4]> {
         let table = Table::random(machine, seed);
         let recordings: Vec<Recording> = (trained.iter().enumerate())
             .map(|(i, p)| record(machine, &table, p, &format!("{i}.csv"), 100 + 10 * seed + i as u64))
@@ -223,14 +228,15 @@ fn elsewhere(machine: &Machine, trained: &[Vec<Vec<f64>>; 3], first_seed: u64) -
         let guess = best.table(machine, &recordings.iter().flat_map(values).collect::<Vec<_>>());
         let asked = [(Kind::AcFr, ERROR_MOTIONS), (Kind::Unified, ERROR_MOTIONS), (Kind::Unified, 0.0)];
         let models = asked.map(|(kind, room)| identify(machine, kind, &recordings, None, room));
-        unseen.each_ref().map(|path| {
+        let judged = unseen.iter().map(|path| {
             let truth = table.lengths(machine, path);
             let [pieces, unified, bent] =
                 models.each_ref().map(|m| mean_size(&truth, &predicted(m, path)) * 1e6);
             [pieces, unified, bent, mean_size(&truth, &guess.lengths(machine, path)) * 1e6]
-        })
+        });
+        judged.collect()
     };
-    let all: Vec<[[f64; 4]; 5]> = (first_seed..first_seed + SEEDS).into_par_iter().map(one).collect();
+    let all: Vec<Vec<[f64; 4]>> = (first_seed..first_seed + SEEDS).into_par_iter().map(one).collect();
     for (path, expected) in expected.iter().enumerate() {
         let mean = |k: usize| all.iter().map(|of| of[path][k]).sum::<f64>() / SEEDS as f64;
         let [pieces, unified, best] = [0, 1, 3].map(mean);
@@ -238,15 +244,24 @@ fn elsewhere(machine: &Machine, trained: &[Vec<Vec<f64>>; 3], first_seed: u64) -
             "path {path}: pieces {pieces:.2}, unified {unified:.2}, best {best:.2} (expected {expected:.2}) um"
         );
     }
-    let sum = |of: &[[f64; 4]; 5], k: usize| of.iter().map(|path| path[k]).sum::<f64>();
+    let sum = |of: &Vec<[f64; 4]>, k: usize| of.iter().map(|path| path[k]).sum::<f64>();
     let over_all = |k: usize| all.iter().map(|of| sum(of, k)).sum::<f64>();
     let ratios: Vec<f64> = all.iter().map(|of| sum(of, 0) / sum(of, 1)).collect();
     let worst = ratios.iter().copied().fold(0.0, f64::max);
     let to_best = [0, 1, 2].map(|k| over_all(k) / over_all(3));
-    let told = Elsewhere { median: median(ratios), worst, to_best };
+    let to_expected = [0, 1, 2].map(|k| over_all(k) / SEEDS as f64 / expected.iter().sum::<f64>());
+    let told = Elsewhere { median: median(ratios), worst, to_best, to_expected };
     println!("pieces against unified: median {:.4}, worst {:.3}", told.median, told.worst);
-    let [pieces, unified, bent] = to_best;
-    println!("against the best: pieces {pieces:.3}, unified {unified:.3}, without room {bent:.3}");
+    for (k, name) in ["pieces", "unified", "without room"].into_iter().enumerate() {
+        let squares = |k: usize| all.iter().map(|of| sum(of, k).powi(2)).sum::<f64>();
+        let by_table = median(all.iter().map(|of| sum(of, k) / sum(of, 3)).collect());
+        println!(
+            "{name} over the best: mean {:.3}, root mean square {:.3}, median of tables {by_table:.3}; mean over the best's expected {:.3}",
+            to_best[k],
+            (squares(k) / squares(3)).sqrt(),
+            to_expected[k]
+        );
+    }
     told
 }
 
@@ -269,16 +284,17 @@ fn training(machine: &Machine) -> [(&'static str, [Vec<Vec<f64>>; 3]); 5] {
     ]
 }
 
-/// How near the best they come depends on the tables and on the three paths (1.09 to 1.44, docs/directions.md), so that no limit
-/// on it is asserted: 1.15 holds for some draws only.
+/// How near the best they come on twenty tables is a matter of the draw as well: 0.99 to 1.34 on others, 1.07 to 1.13 expected on all,
+/// docs/directions.md.
 #[test]
-fn on_paths_not_trained_on_pieces_are_one_model_and_room_for_error_motions_helps() {
+fn on_paths_not_trained_on_pieces_are_one_model_and_both_are_near_the_best() {
     let machine = common::machine("ac_table_tilting_paper");
     let [(_, trained), ..] = training(&machine);
-    let told = elsewhere(&machine, &trained, 0);
+    let told = elsewhere(&machine, &trained, &paths_to_judge_on(&machine), 0);
     assert!((told.median - 1.0).abs() < 0.01 && told.worst <= 1.1);
     let [pieces, unified, bent] = told.to_best;
-    assert!(pieces < bent && unified < bent);
+    assert!(pieces <= 1.15 && unified <= 1.15 && bent > 1.5, "{:?}", told.to_best);
+    assert!(told.to_expected[0] <= 1.15, "{:?}", told.to_expected);
 }
 
 /// Other tables and other paths than the constants were chosen with.
@@ -289,11 +305,32 @@ fn comparison_on_tables_and_training_paths_that_nothing_was_chosen_with() {
         return;
     }
     let machine = common::machine("ac_table_tilting_paper");
-    let sets = training(&machine);
+    let (sets, unseen) = (training(&machine), paths_to_judge_on(&machine));
     let twice = [(&sets[0], 2000)].into_iter();
     for ((name, trained), first_seed) in sets.iter().map(|set| (set, 1000)).chain(twice) {
         println!("trained on {name}, tables from {first_seed}");
-        let told = elsewhere(&machine, trained, first_seed);
+        let told = elsewhere(&machine, trained, &unseen, first_seed);
         assert!(told.to_best[0] < told.to_best[2], "room for error motions helps");
+    }
+}
+
+/// Five paths, three of them to train on and two to judge on, in all ten ways.
+#[test]
+fn comparison_of_every_three_of_five_paths() {
+    if std::env::var_os("KINCAL_COMPARE").is_none() {
+        println!("skipped: set KINCAL_COMPARE=1 to compare");
+        return;
+    }
+    let machine = common::machine("ac_table_tilting_paper");
+    let all = paths_to_judge_on(&machine);
+    for first in 0..5 {
+        for second in first + 1..5 {
+            let judged = [all[first].clone(), all[second].clone()];
+            let rest: Vec<usize> = (0..5).filter(|k| *k != first && *k != second).collect();
+            println!("trained on paths {rest:?}, judged on {first} and {second}, tables from 1000");
+            let trained = [0, 1, 2].map(|k| all[rest[k]].clone());
+            let told = elsewhere(&machine, &trained, &judged, 1000);
+            assert!(told.to_best[0] < told.to_best[2], "room for error motions helps");
+        }
     }
 }

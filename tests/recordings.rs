@@ -252,7 +252,7 @@ fn a_line_without_end_is_refused() {
 fn odd_but_harmless_headers_are_warned_of() {
     let recording = good(
         "#\n# a comment: with many words\n# zero unknown\n# operator: me\n# date: 2024-01-01\n# zero: unknown\n# direction: 1,0,0\n\
-         # measurement: distance\nx[mm],c[deg],r[mm],y_direction[1]\n1,0,5,1\n",
+         # measurement: distance\nx[mm],c[deg],r[mm],wind_direction[deg]\n1,0,5,1\n",
     );
     insta::assert_snapshot!(recording.scan().expect("rows").warnings.join("\n"));
 }

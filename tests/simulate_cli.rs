@@ -304,6 +304,7 @@ fn drive() -> Drive {
         acceleration: 0.5,
         rotary_acceleration: 20.0,
         corner: 0.1,
+        without_approach: false,
         rate: 200.0,
     }
 }
@@ -540,4 +541,28 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn the_approach_of_a_program_is_left_out_when_asked() {
+    let folder = Folder::new("approach");
+    let machine = common::machine("xyz_mill");
+    let lines = |text: &str, without_approach: bool| -> Vec<usize> {
+        let path = folder.write("part.nc", text);
+        let course = PartProgram::new(path, &machine, Drive { without_approach, ..drive() }, rest(&machine));
+        let all = course.samples().expect("it opens").map(|s| s.unwrap_or_else(|e| panic!("{e}")));
+        let line = |s: Sample| match s.at {
+            At::Line(line) => line,
+            _ => panic!("a line"),
+        };
+        let mut lines: Vec<usize> = all.filter(|s| s.recorded).map(line).collect();
+        lines.dedup();
+        lines
+    };
+    // Rapid motion later on is the program's own.
+    let rapid = "G90\nG0 X10\nG4 P0.1\nG0 Z5\nG1 X20 F1200\nG0 Z9\nG1 X9\n";
+    assert_eq!(lines(rapid, false), [2, 3, 4, 5, 6, 7]);
+    assert_eq!(lines(rapid, true), [5, 6, 7]);
+    let straight = "G90 G1 X10 F900\nX20\nG0 X9\n";
+    assert_eq!(lines(straight, true), [2, 3]);
 }

@@ -112,7 +112,7 @@ impl PiecesForm {
             samples[piece] = seen.samples;
         }
         let varying = Varying { directions: Some(directions), terms: Vec::new() };
-        Ok(Variation { varying, parts, coefficients: Vec::new(), dead_bands, samples })
+        Ok(Variation { varying, parts, dead_bands, samples, ..Variation::default() })
     }
 }
 

@@ -80,8 +80,8 @@ pub(crate) struct Args {
     /// Use so many samples of each piece of the model, evenly spread, and judge it on the others
     #[arg(long, value_name = "N", value_parser = whole, allow_negative_numbers = true)]
     samples: Option<u64>,
-    /// Leave room for smooth error motions of every joint, over the tolerance of its frame, such as 0.03: for a model that is to hold on
-    /// other paths
+    /// Leave room for smooth error motions of every joint, over the tolerance of its frame, such as 0.03, and keep them: for a model that is
+    /// to hold on other paths
     #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share, allow_negative_numbers = true)]
     error_motions: f64,
     /// List every component of every deviation, not only those that the data determine

@@ -40,8 +40,8 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = Tuning::default().cut, value_parser = relative, allow_negative_numbers = true)]
     cut: f64,
     /// Steps of the damped and truncated schemes
-    #[arg(long, default_value_t = Tuning::default().steps)]
-    steps: usize,
+    #[arg(long, default_value_t = Tuning::default().steps as u64, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    steps: u64,
     /// Find the set-ups of the recordings to judge by again, from those recordings
     #[arg(long)]
     fit_setup: bool,
@@ -63,7 +63,7 @@ struct Comparison<'a> {
 pub(crate) fn run(args: &Args) -> Outcome {
     let all: Vec<PathBuf> = args.recordings.iter().chain(&args.judge).cloned().collect();
     check_outputs(&[args.common.json_file()], &all)?;
-    let tuning = Tuning { tau: args.tau, cut: args.cut, steps: args.steps };
+    let tuning = Tuning { tau: args.tau, cut: args.cut, steps: args.steps as usize };
     let rivals = chosen(&args.rivals, tuning)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let open = |paths: &[PathBuf]| -> Outcome<Vec<Recording>> {
@@ -112,7 +112,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         judged_by,
         tau: args.tau,
         cut: args.cut,
-        steps: args.steps,
+        steps: args.steps as usize,
         rivals: &verdicts,
     })
 }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use kincal::CalibratedMachine;
-use kincal::compensate::{Listed, Options, Report, Setup, Worst, compensate};
+use kincal::compensate::{Listed, Options, Report, Setup, UnknownWay, Worst, compensate};
 use kincal::inverse::Mode;
 use kincal::nc::Dialect;
 use kincal::units::{Quantity, Unit};
@@ -129,7 +129,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(tolerance) = args.arcs.filter(|tolerance| report.largest_arc_m.value > *tolerance) {
         let _ = writeln!(
             text,
-            "note: --arcs {} is not held, {}: what is left at the ends adds to it (axes never named, digits, reach)",
+            "note: --arcs {} is not held, {}: where a direction of travel changes the correction steps, and the line begins on its other side",
             length(tolerance),
             at(report.largest_arc_m, length)
         );
@@ -217,6 +217,27 @@ fn notes(r: &Report) -> String {
             count(r.reversals.count, "block", "blocks"),
             at(r.largest_reversal_m, length),
             lines(&r.reversals, |x| x.line)
+        );
+    }
+    for taken in [true, false] {
+        let of = |way: &&UnknownWay| (way.side != 0) == taken;
+        let first: Vec<&UnknownWay> = r.unknown_ways.first.iter().filter(of).collect();
+        let joints: std::collections::BTreeSet<&str> = first.iter().map(|way| way.joint.as_str()).collect();
+        let joints: Vec<&str> = joints.into_iter().collect();
+        let mut at: Vec<String> = first.iter().map(|way| way.line.to_string()).collect();
+        at.dedup();
+        if at.is_empty() {
+            continue;
+        }
+        let more = if at.len() > 8 || r.unknown_ways.count > first.len() as u64 { " and more" } else { "" };
+        at.truncate(8);
+        let _ = writeln!(
+            text,
+            "note: from where {} comes at {} {}{more} is not known; taken is {} (`start` and `reference` of the set-up say where axes stand)",
+            joints.join(", "),
+            if at.len() == 1 { "line" } else { "lines" },
+            at.join(", "),
+            if taken { "the direction of its first motion" } else { "the mean of both directions" }
         );
     }
     if r.unseen_directions.count > 0 {

@@ -130,6 +130,21 @@ impl Arc {
         p
     }
 
+    /// Parts `s` at which it is looked at, up to its end: the ends of its quadrants, where an axis of the plane turns round, among them.
+    pub fn stations(&self) -> Vec<f64> {
+        const OF_TURN: f64 = 32.0;
+        const MOST: usize = 4096;
+        let count = (self.sweep.abs() / TAU * OF_TURN).ceil().clamp(8.0, MOST as f64);
+        let mut stations: Vec<f64> = (0..=count as usize).map(|k| k as f64 / count).collect();
+        let quadrant = 0.25 * TAU;
+        let (low, high) = (self.from.min(self.from + self.sweep), self.from.max(self.from + self.sweep));
+        let first = (low / quadrant).ceil() as i64;
+        let turns = (first..).map(|k| k as f64 * quadrant).take_while(|angle| *angle < high).take(MOST);
+        stations.extend(turns.map(|angle| ((angle - self.from) / self.sweep).clamp(0.0, 1.0)));
+        stations.sort_by(f64::total_cmp);
+        stations
+    }
+
     /// How many equal chords stay within `room` (m) of it.
     pub fn chords(&self, room: f64) -> usize {
         let radius = self.radius[0].max(self.radius[1]);

@@ -51,7 +51,7 @@ impl Follower<'_> {
     /// Tells the model where the program goes; where that changes the piece, the step of the correction is
     /// told.
     pub fn advance(&mut self, line: usize, q: &[f64]) {
-        self.model.advance(q);
+        self.tell(Some(line), q);
         if self.extrapolated != line && self.model.extrapolates(q) {
             self.extrapolated = line;
             self.report.extrapolated_moves += 1;

@@ -15,6 +15,7 @@ use crate::variation::{Slot, Variation};
 ///
 /// A program has positions and their order, and neither a clock nor channels: what depends on time stands as it did at the
 /// end of the recordings, what depends on speed or belongs to the instrument is left out.
+#[derive(Clone)]
 pub(super) struct Effects<'a> {
     calibrated: &'a CalibratedMachine,
     variation: Variation,
@@ -29,6 +30,8 @@ pub(super) struct Effects<'a> {
     at: Option<Vec<f64>>,
     /// Steps by one where a direction changes.
     piece: usize,
+    /// Commands whose direction of travel counts.
+    keyed: Vec<usize>,
 }
 
 impl<'a> Effects<'a> {
@@ -48,8 +51,10 @@ impl<'a> Effects<'a> {
             }
             None
         });
-        let walk = walk(calibrated, &variation);
-        let tracker = at_rest(calibrated);
+        let still = vec![0; calibrated.machine().commands().len()];
+        let walk = walk(calibrated, &variation, &still);
+        let tracker = at_rest(calibrated, &still);
+        let keyed = keyed(calibrated, &variation);
         let chain = calibrated.chain();
         let pattern = 0;
         let mut model = Effects {
@@ -63,18 +68,22 @@ impl<'a> Effects<'a> {
             chain,
             at: None,
             piece: 0,
+            keyed,
         };
-        model.restart();
+        model.restart(&still);
         model
     }
 
     /// The chain with these values of the features.
-    fn with(&self, features: &[f64]) -> Chain<f64> {
+    fn with(&self, features: &[f64], commands: &[f64]) -> Chain<f64> {
         let machine = self.calibrated.machine();
         let parts = self.variation.direction_part(self.pattern, machine.dyads().len());
         let mut before: Vec<Twist<f64>> =
             self.calibrated.deviations().iter().zip(&parts).map(|(dh, part)| *dh + *part).collect();
         let mut behind = vec![Twist::zero(0.0); before.len()];
+        if !self.variation.motions.is_empty() {
+            self.variation.motions.add(machine, commands, &self.tracker.directions(), &mut before);
+        }
         let mut values = features.iter();
         for (term, coefficient) in self.variation.varying.terms.iter().zip(&self.variation.coefficients) {
             for part in &term.parts {
@@ -113,18 +122,36 @@ fn unknown_to_programs(
     timeless.then(|| "it depends on time, and the file does not say when its recordings ended".into())
 }
 
-fn walk(calibrated: &CalibratedMachine, variation: &Variation) -> Walk {
+fn walk(calibrated: &CalibratedMachine, variation: &Variation, first: &[i8]) -> Walk {
     let machine = calibrated.machine();
     let features = variation.varying.features().cloned().collect();
-    let nowhere = vec![0; machine.dyads().len()];
-    Walk::new(machine, features, &by_dyad(machine, &variation.dead_bands), &nowhere)
+    let mut by_joint = vec![0; machine.dyads().len()];
+    for (j, _) in machine.joints() {
+        if let Some([(c, factor)]) = machine.drive(j).map(|drive| drive.terms.as_slice()) {
+            by_joint[j] = if *factor < 0.0 { -first[*c] } else { first[*c] };
+        }
+    }
+    Walk::new(machine, features, &by_dyad(machine, &variation.dead_bands), &by_joint)
+}
+
+/// Commands of the joints whose way counts for an effect, and those that choose the piece.
+fn keyed(calibrated: &CalibratedMachine, variation: &Variation) -> Vec<usize> {
+    let machine = calibrated.machine();
+    let history = variation.varying.features().filter(|f| f.needs_history()).flat_map(Feature::joints);
+    let commands = history.filter_map(|j| machine.drive(j)).flat_map(|d| d.terms.iter().map(|(c, _)| *c));
+    let axes = variation.varying.directions.iter().flat_map(|d| d.axes().iter().copied());
+    let mut all: Vec<usize> = commands.chain(axes).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 impl Model for Effects<'_> {
-    fn advance(&mut self, commands: &[f64]) {
+    fn advance(&mut self, commands: &[f64], ways: &[bool]) {
         if self.at.as_deref() == Some(commands) {
             return;
         }
+        (0..commands.len()).filter(|c| !ways[*c]).for_each(|c| self.tracker.lose(c));
         self.tracker.advance(commands, |_| None);
         let directions = self.tracker.directions();
         let pattern = self.variation.varying.directions.as_ref().map_or(0, |d| d.piece(&directions));
@@ -133,7 +160,7 @@ impl Model for Effects<'_> {
         let values = self.walk.step(self.calibrated.machine(), commands, end, false, |_| None);
         self.pattern = pattern;
         self.piece += usize::from(before != (pattern, self.walk.directions()));
-        self.chain = self.with(&values);
+        self.chain = self.with(&values, commands);
         self.at = Some(commands.to_vec());
     }
 
@@ -145,7 +172,7 @@ impl Model for Effects<'_> {
         if self.at.as_deref().is_none_or(|at| at == commands) {
             return Cow::Borrowed(&self.chain);
         }
-        Cow::Owned(self.with(&self.walk.passing(self.calibrated.machine(), commands)))
+        Cow::Owned(self.with(&self.walk.passing(self.calibrated.machine(), commands), commands))
     }
 
     fn piece(&self) -> usize {
@@ -168,12 +195,24 @@ impl Model for Effects<'_> {
         self.calibrated.extrapolates(commands)
     }
 
-    fn restart(&mut self) {
-        self.walk = walk(self.calibrated, &self.variation);
-        self.tracker = at_rest(self.calibrated);
+    fn restart(&mut self, first: &[i8]) {
+        self.walk = walk(self.calibrated, &self.variation, first);
+        self.tracker = at_rest(self.calibrated, first);
         let still = self.tracker.directions();
         self.pattern = self.variation.varying.directions.as_ref().map_or(0, |d| d.piece(&still));
         (self.at, self.piece) = (None, 0);
+    }
+
+    fn ahead(&self) -> Box<dyn Model + '_> {
+        Box::new(self.clone())
+    }
+
+    fn keyed(&self) -> &[usize] {
+        &self.keyed
+    }
+
+    fn directions(&self) -> Vec<i8> {
+        self.tracker.directions()
     }
 
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {

@@ -35,6 +35,19 @@ pub enum CompensateFault {
         /// Digits behind the point.
         decimals: usize,
     },
+    /// An arc that stays further off than its tolerance, whatever lines take its place.
+    #[error(
+        "{left_um:.1} um are left on this arc, more than the {tolerance_um} um of --arcs{}",
+        without(axes)
+    )]
+    ArcNotHeld {
+        /// What is left, um.
+        left_um: f64,
+        /// As asked for, um.
+        tolerance_um: f64,
+        /// Axes that the program has not placed before, so that they are not written.
+        axes: Vec<String>,
+    },
     /// Another kind of motion.
     #[error("{what} cannot be corrected word by word")]
     OtherMotion {
@@ -94,6 +107,13 @@ pub enum CompensateFault {
     },
 }
 
+fn without(axes: &[String]) -> String {
+    if axes.is_empty() {
+        return String::new();
+    }
+    format!(": the program has not placed {} before it", axes.join(", "))
+}
+
 impl CompensateFault {
     /// How to mend it.
     pub fn mend(&self) -> String {
@@ -105,6 +125,17 @@ impl CompensateFault {
             ArcGeometry { .. } => "check start, end and centre of the arc".into(),
             ArcTolerance { decimals, .. } => {
                 format!("give a larger tolerance, or --decimals {}", decimals + 1)
+            }
+            ArcNotHeld { axes, .. } if axes.is_empty() => {
+                "keep the arc away from the ends of travel, or give a larger tolerance".into()
+            }
+            ArcNotHeld { axes, .. } => {
+                let starts: Vec<String> = axes.iter().map(|axis| format!("\"{axis}\": ...")).collect();
+                format!(
+                    "name {} with an absolute place before the arc, or say where it stands: --setup FILE.ron with `start: {{{}}}`",
+                    axes.join(", "),
+                    starts.join(", ")
+                )
             }
             OtherMotion { .. } => "let the CAM system write it as G0, G1, G2, G3".into(),
             UnknownTool { tool } => {

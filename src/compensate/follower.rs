@@ -12,6 +12,7 @@ use super::model::Model;
 use super::report::Report;
 use super::setup::Setup;
 use super::tool::Tool;
+use super::ways::Ways;
 use crate::error::{Error, Result};
 use crate::inverse::{Inverse, Mode};
 use crate::machine::{JointKind, Machine};
@@ -50,6 +51,9 @@ pub(super) struct Follower<'a> {
     /// Where the control takes the machine by what has been written.
     pub written: Position,
     pub status: Vec<Status>,
+    pub ways: Ways,
+    /// Only looks where the program goes; nothing is corrected.
+    pub scouting: bool,
     /// Most digits behind the point so far, of lengths and of angles.
     pub decimals: [usize; 2],
     /// The last corrected position before rounding: as meant, as corrected; and the piece that it belongs to.
@@ -94,6 +98,7 @@ impl<'a> Follower<'a> {
         setup: &'a Setup,
         options: &'a Options,
         dialect: Dialect,
+        first: &[i8],
     ) -> Self {
         let control = Control::new(machine, setup);
         let inverse = Inverse::new(machine);
@@ -102,7 +107,7 @@ impl<'a> Follower<'a> {
         let count = control.axes.len();
         let start = Position { q: vec![0.0; machine.commands().len()], program: vec![0.0; count] };
         let slides = inverse.with_mode(Mode::Position);
-        model.restart();
+        model.restart(first);
         let mut follower = Follower {
             machine,
             control,
@@ -115,6 +120,8 @@ impl<'a> Follower<'a> {
             meant: start.clone(),
             written: start,
             status: vec![Status::Never; count],
+            ways: Ways::new(count, machine.commands().len()),
+            scouting: false,
             decimals: [0, 0],
             last: None,
             written_motion: None,
@@ -150,6 +157,7 @@ impl<'a> Follower<'a> {
             if let Some(value) = setup.start(&axis.address, axis.rotary) {
                 program[i] = value;
                 self.status[i] = Status::Placed;
+                self.ways.sure[i] = true;
             }
         }
         if let Some(q) = self.control.joints(&program, &self.meant.q.clone()) {
@@ -158,6 +166,8 @@ impl<'a> Follower<'a> {
         }
         self.control.tcp = tcp;
         self.refresh();
+        let q = self.meant.q.clone();
+        self.tell(None, &q);
     }
 
     /// Follows one block and writes it, with what stands in its place.
@@ -193,7 +203,8 @@ impl<'a> Follower<'a> {
             Dialect::Heidenhain => false,
         };
         if refers {
-            self.park(block);
+            let first = has_g(block, 28.0) || has_g(block, 74.0);
+            self.park(block, first);
             self.report.machine_moves += 1;
         }
         if let Some(motion) = step.motion {
@@ -273,7 +284,7 @@ impl<'a> Follower<'a> {
     }
 
     /// Coordinates mean something else now; the machine has not moved.
-    fn refresh(&mut self) {
+    pub fn refresh(&mut self) {
         for position in [&mut self.meant, &mut self.written] {
             position.program = self.control.program(&position.q, &position.program);
         }
@@ -322,28 +333,35 @@ impl<'a> Follower<'a> {
             return refuse(block, 0, CompensateFault::Call { what: name });
         }
         self.status.iter_mut().filter(|s| **s == Status::Placed).for_each(|s| *s = Status::Parked);
+        self.ways.sure.fill(false);
         Ok(())
     }
 
     /// The axis of the tool length is behind a cycle wherever the cycle leaves it.
     pub fn leave_normal(&mut self) {
         let normal = self.control.normal;
-        for (axis, status) in self.control.axes.iter().zip(&mut self.status) {
-            if axis.tip == Some(normal) && *status == Status::Placed {
-                *status = Status::Parked;
+        for i in (0..self.status.len()).filter(|i| self.control.axes[*i].tip == Some(normal)) {
+            self.ways.sure[i] = false;
+            if self.status[i] == Status::Placed {
+                self.status[i] = Status::Parked;
             }
         }
     }
 
-    /// Axes named (all, if none is) stand at a reference point.
-    fn park(&mut self, block: &Block) {
+    /// Axes named (all, if none is) stand at a reference point; `first`: at the one that the set-up may say.
+    fn park(&mut self, block: &Block, first: bool) {
         let is_named = |address: &str| block.words().iter().any(|w| w.address == address);
         let none = !self.control.axes.iter().any(|a| is_named(&a.address));
-        for (axis, status) in self.control.axes.iter().zip(&mut self.status) {
+        let mut told = Vec::new();
+        for (i, axis) in self.control.axes.iter().enumerate() {
             if none || is_named(&axis.address) {
-                *status = Status::Parked;
+                self.status[i] = Status::Parked;
+                self.ways.sure[i] = false;
+                let place = self.control.setup.reference(&axis.address, axis.rotary).filter(|_| first);
+                told.extend(place.map(|place| (i, place)));
             }
         }
+        self.refer(&told);
     }
 
     /// `G53`, `SUPA`: the numbers are places of the machine, and stay.
@@ -351,12 +369,16 @@ impl<'a> Follower<'a> {
         for i in 0..motion.words.len() {
             let Some(word) = motion.words[i] else { continue };
             self.status[i] = Status::Parked;
+            self.ways.sure[i] = false;
             if let Some(value) = block.words()[word].number()
                 && let Some((c, q)) = self.control.machine_joint(i, self.control.si(i, value))
             {
                 (self.meant.q[c], self.written.q[c]) = (q, q);
+                self.ways.sure[i] = true;
             }
         }
+        let q = self.meant.q.clone();
+        self.tell(None, &q);
         self.refresh();
         self.written_motion = Some(motion.kind);
         self.report.machine_moves += 1;
@@ -375,6 +397,9 @@ impl<'a> Follower<'a> {
         if !self.control.tcp && tilted && self.control.length != 0.0 {
             let what = "a tilted frame without tool centre point function".to_string();
             return refuse(block, 0, CompensateFault::Frame { what });
+        }
+        if self.scouting {
+            return self.scout(block, motion, target);
         }
         if motion.kind == MotionKind::Cycle || self.state.modes().modal_call {
             return self.cycle(block, motion, target, out);

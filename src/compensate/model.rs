@@ -1,6 +1,7 @@
 //! What compensation asks of a calibrated machine: the kinematics that hold behind each commanded position.
 
 use std::borrow::Cow;
+use std::rc::Rc;
 
 use super::effects::Effects;
 use crate::calibration::{CalibratedMachine, LeftOut};
@@ -14,8 +15,9 @@ use crate::variation::Directions;
 /// Errors may depend on how a position was reached. A model keeps what that takes (directions of travel with
 /// a dead band, play); standing still changes nothing.
 pub trait Model {
-    /// Takes the next commanded position into account, m or rad, machine order.
-    fn advance(&mut self, commands: &[f64]);
+    /// Takes the next commanded position into account, m or rad, machine order. `ways`: whether it is known from where each command
+    /// comes there; where it is not, no direction of travel follows.
+    fn advance(&mut self, commands: &[f64], ways: &[bool]);
 
     /// The chain that holds at the position last told.
     fn chain(&self) -> &Chain<f64>;
@@ -50,8 +52,22 @@ pub trait Model {
     /// Whether a commanded position lies beyond what the calibration has seen.
     fn extrapolates(&self, commands: &[f64]) -> bool;
 
-    /// Forgets every position told, as at the start of a program.
-    fn restart(&mut self);
+    /// Forgets every position told, as at the start of a program. `first`: direction of the first motion of each command, which holds
+    /// before it; 0 where that is not known.
+    fn restart(&mut self, first: &[i8]);
+
+    /// A copy that stands where this one does, to be told what lies ahead.
+    fn ahead(&self) -> Box<dyn Model + '_>;
+
+    /// Commands whose direction of travel counts.
+    fn keyed(&self) -> &[usize] {
+        &[]
+    }
+
+    /// Directions of travel of all commands at the position last told, 0 where not known; empty where no direction counts.
+    fn directions(&self) -> Vec<i8> {
+        Vec::new()
+    }
 
     /// Deviations that may be there as well, as [`CalibratedMachine::unseen`].
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
@@ -68,17 +84,42 @@ pub(super) fn of_machine(calibrated: &CalibratedMachine) -> Box<dyn Model + '_> 
     }
     match &varying.directions {
         Some(directions) => Box::new(Pieces::new(calibrated, directions)),
-        None => Box::new(Constant { calibrated, chain: calibrated.chain() }),
+        None => Box::new(Constant { calibrated, chain: Rc::new(calibrated.chain()), bent: None }),
     }
 }
 
-/// One set of deviations for each pattern of directions of travel.
+/// The chain of these deviations with the error motions at the commands `q`; `None` where there are no error motions.
+fn bent(
+    calibrated: &CalibratedMachine,
+    dh: impl FnOnce() -> Vec<Twist<f64>>,
+    q: &[f64],
+    directions: &[i8],
+) -> Option<Chain<f64>> {
+    let motions = &calibrated.variation().motions;
+    if motions.is_empty() {
+        return None;
+    }
+    let mut dh = dh();
+    motions.add(calibrated.machine(), q, directions, &mut dh);
+    Some(Chain::new(calibrated.machine(), &dh))
+}
+
+/// Constant and direction part of every dyad in a piece.
+fn of_piece(calibrated: &CalibratedMachine, piece: usize) -> Vec<Twist<f64>> {
+    let parts = calibrated.variation().direction_part(piece, calibrated.deviations().len());
+    calibrated.deviations().iter().zip(&parts).map(|(dh, part)| *dh + *part).collect()
+}
+
+/// One set of deviations for each pattern of directions of travel, and error motions where they are known.
 ///
-/// An axis that has not moved yet has no direction: the mean of both holds for it.
+/// An axis without known direction has the mean of both.
+#[derive(Clone)]
 struct Pieces<'a> {
     calibrated: &'a CalibratedMachine,
     directions: &'a Directions,
-    chains: Vec<Chain<f64>>,
+    chains: Rc<[Chain<f64>]>,
+    /// With the error motions at the position last told.
+    bent: Option<Chain<f64>>,
     tracker: Tracker,
     piece: usize,
 }
@@ -86,37 +127,35 @@ struct Pieces<'a> {
 impl<'a> Pieces<'a> {
     fn new(calibrated: &'a CalibratedMachine, directions: &'a Directions) -> Self {
         let machine = calibrated.machine();
-        let chain = |piece: usize| {
-            let parts = calibrated.variation().direction_part(piece, machine.dyads().len());
-            let dh: Vec<Twist<f64>> =
-                calibrated.deviations().iter().zip(&parts).map(|(dh, part)| *dh + *part).collect();
-            Chain::new(machine, &dh)
-        };
+        let still = vec![0; machine.commands().len()];
+        let chain = |piece: usize| Chain::new(machine, &of_piece(calibrated, piece));
         Pieces {
             calibrated,
             directions,
             chains: (0..directions.piece_count()).map(chain).collect(),
-            tracker: at_rest(calibrated),
-            piece: directions.piece(&vec![0; machine.commands().len()]),
+            bent: None,
+            tracker: at_rest(calibrated, &still),
+            piece: directions.piece(&still),
         }
     }
 }
 
 /// Nothing has moved yet.
-pub(super) fn at_rest(calibrated: &CalibratedMachine) -> Tracker {
-    let bands = calibrated.variation().dead_bands.clone();
-    let first = vec![0; bands.len()];
-    Tracker::new(bands, first)
+pub(super) fn at_rest(calibrated: &CalibratedMachine, first: &[i8]) -> Tracker {
+    Tracker::new(calibrated.variation().dead_bands.clone(), first.to_vec())
 }
 
 impl Model for Pieces<'_> {
-    fn advance(&mut self, commands: &[f64]) {
+    fn advance(&mut self, commands: &[f64], ways: &[bool]) {
+        (0..commands.len()).filter(|c| !ways[*c]).for_each(|c| self.tracker.lose(c));
         self.tracker.advance(commands, |_| None);
-        self.piece = self.directions.piece(&self.tracker.directions());
+        let directions = self.tracker.directions();
+        self.piece = self.directions.piece(&directions);
+        self.bent = bent(self.calibrated, || of_piece(self.calibrated, self.piece), commands, &directions);
     }
 
     fn chain(&self) -> &Chain<f64> {
-        &self.chains[self.piece]
+        self.bent.as_ref().unwrap_or(&self.chains[self.piece])
     }
 
     fn piece(&self) -> usize {
@@ -131,15 +170,29 @@ impl Model for Pieces<'_> {
     fn is_nominal(&self) -> bool {
         is_zero(self.calibrated.deviations())
             && self.calibrated.variation().parts.iter().all(|part| is_zero(part))
+            && self.calibrated.variation().motions.is_empty()
     }
 
     fn extrapolates(&self, commands: &[f64]) -> bool {
         self.calibrated.extrapolates(commands)
     }
 
-    fn restart(&mut self) {
-        self.tracker = at_rest(self.calibrated);
-        self.piece = self.directions.piece(&self.tracker.directions());
+    fn restart(&mut self, first: &[i8]) {
+        self.tracker = at_rest(self.calibrated, first);
+        self.piece = self.directions.piece(first);
+        self.bent = None;
+    }
+
+    fn ahead(&self) -> Box<dyn Model + '_> {
+        Box::new(self.clone())
+    }
+
+    fn keyed(&self) -> &[usize] {
+        self.directions.axes()
+    }
+
+    fn directions(&self) -> Vec<i8> {
+        self.tracker.directions()
     }
 
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
@@ -152,16 +205,21 @@ pub(super) fn is_zero(deviations: &[Twist<f64>]) -> bool {
 }
 
 /// One set of deviations everywhere.
+#[derive(Clone)]
 struct Constant<'a> {
     calibrated: &'a CalibratedMachine,
-    chain: Chain<f64>,
+    chain: Rc<Chain<f64>>,
+    /// With the error motions at the position last told.
+    bent: Option<Chain<f64>>,
 }
 
 impl Model for Constant<'_> {
-    fn advance(&mut self, _: &[f64]) {}
+    fn advance(&mut self, commands: &[f64], _: &[bool]) {
+        self.bent = bent(self.calibrated, || self.calibrated.deviations().to_vec(), commands, &[]);
+    }
 
     fn chain(&self) -> &Chain<f64> {
-        &self.chain
+        self.bent.as_ref().unwrap_or(&self.chain)
     }
 
     fn piece(&self) -> usize {
@@ -169,14 +227,20 @@ impl Model for Constant<'_> {
     }
 
     fn is_nominal(&self) -> bool {
-        is_zero(self.calibrated.deviations())
+        is_zero(self.calibrated.deviations()) && self.calibrated.variation().motions.is_empty()
     }
 
     fn extrapolates(&self, commands: &[f64]) -> bool {
         self.calibrated.extrapolates(commands)
     }
 
-    fn restart(&mut self) {}
+    fn restart(&mut self, _: &[i8]) {
+        self.bent = None;
+    }
+
+    fn ahead(&self) -> Box<dyn Model + '_> {
+        Box::new(self.clone())
+    }
 
     fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
         self.calibrated.unseen()

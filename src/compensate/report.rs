@@ -79,6 +79,17 @@ pub struct UnseenPiece {
     pub piece: String,
 }
 
+/// An axis comes to a block's end from a place that is not known.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnknownWay {
+    /// Line of the block.
+    pub line: usize,
+    /// Name of the joint.
+    pub joint: String,
+    /// The direction that is taken: that of its first motion on a known way, or 0 for the mean of both.
+    pub side: i8,
+}
+
 /// A joint that would leave its travel.
 #[derive(Clone, Debug, Serialize)]
 pub struct OutOfTravel {
@@ -156,6 +167,8 @@ pub struct Report {
     /// Blocks in a pattern of directions that the calibration has not seen; they are corrected by what single directions have
     /// shown.
     pub unseen_directions: Listed<UnseenPiece>,
+    /// Where an axis whose direction of travel counts comes from a place that is not known.
+    pub unknown_ways: Listed<UnknownWay>,
     /// Blocks at which a joint would leave its travel.
     pub out_of_travel: Listed<OutOfTravel>,
     /// Blocks at which a direction of the tool is lost.

@@ -10,6 +10,9 @@ use crate::error::{Error, Result};
 use crate::machine::FileUnits;
 use crate::units::Unit;
 
+/// Where the form of such a file is taught.
+const GUIDE: &str = "docs/compensate.md shows the form of a set-up file";
+
 /// The set-up of a program, `docs/compensate.md`. Numbers in the file's units.
 #[derive(Clone, Debug, Default)]
 pub struct Setup {
@@ -37,6 +40,8 @@ struct Form {
     tool_axis: ToolAxis,
     #[serde(default)]
     start: BTreeMap<String, f64>,
+    #[serde(default)]
+    reference: BTreeMap<String, f64>,
     #[serde(default)]
     tcp_on: Vec<String>,
     #[serde(default)]
@@ -108,7 +113,7 @@ impl Setup {
     /// # Errors
     /// [`Error::File`], [`Error::Ron`] with line and column.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
-        Self::from_document(&Document::open(path)?)
+        Self::from_document(&Document::open(path)?.guided(GUIDE))
     }
 
     /// Reads a text; `file` is only the name that messages use.
@@ -116,7 +121,7 @@ impl Setup {
     /// # Errors
     /// As [`Setup::open`].
     pub fn parse(file: impl AsRef<Path>, text: &str) -> Result<Self> {
-        Self::from_document(&Document::new(file, text.to_string())?)
+        Self::from_document(&Document::new(file, text.to_string())?.guided(GUIDE))
     }
 
     fn from_document(document: &Document) -> Result<Self> {
@@ -127,6 +132,7 @@ impl Setup {
             }))
             .chain(form.tools.iter().map(|(k, v)| (format!("tools.{k}"), *v)))
             .chain(form.start.iter().map(|(k, v)| (format!("start.{k}"), *v)))
+            .chain(form.reference.iter().map(|(k, v)| (format!("reference.{k}"), *v)))
             .chain([("reference_length".to_string(), form.reference_length)]);
         for (path, value) in numbers {
             if !(value.is_finite() && value.abs() < 1e9) {
@@ -153,6 +159,7 @@ impl Setup {
         };
         form.zero = keyed(&form.zero);
         form.start = keyed(&form.start);
+        form.reference = keyed(&form.reference);
         form.tools = keyed(&form.tools);
         form.work_offsets = keyed(&form.work_offsets).into_iter().map(|(k, v)| (k, keyed(&v))).collect();
         for list in [&mut form.tcp_on, &mut form.tcp_off, &mut form.calls] {
@@ -184,6 +191,11 @@ impl Setup {
     pub(super) fn offset(&self, name: &str, address: &str, rotary: bool) -> Option<f64> {
         let axes = self.form.work_offsets.get(&key(name))?;
         Some(axes.get(address).map_or(0.0, |value| self.si(*value, rotary)))
+    }
+
+    /// Where `G28` takes the axis, in the machine's own frame, m or rad.
+    pub(super) fn reference(&self, address: &str, rotary: bool) -> Option<f64> {
+        self.form.reference.get(address).map(|value| self.si(*value, rotary))
     }
 
     /// The offset in force before the program names one.

@@ -6,6 +6,7 @@ use super::arc::Arc;
 use super::correct::plain;
 use super::fault::CompensateFault;
 use super::follower::{Follower, Position, Status, line_text, put, put_bytes, refuse};
+use crate::chain::Chain;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Distance, Motion, MotionKind};
 
@@ -174,6 +175,10 @@ impl Follower<'_> {
             Err(what) => return refuse(block, 0, CompensateFault::ArcGeometry { what }),
         };
         if !self.matters(block, &arc)? {
+            for s in arc.stations() {
+                let q = self.joints(block, &arc.at(s))?;
+                self.tell(Some(line), &q);
+            }
             let q = self.joints(block, &target)?;
             let end = Position { q: q.clone(), program: target };
             self.advance(line, &q);
@@ -214,12 +219,20 @@ impl Follower<'_> {
     }
 
     /// Whether the correction shows in the written digits anywhere along an arc.
-    fn matters(&mut self, block: &Block, arc: &Arc) -> Result<bool> {
-        for k in 0..=8 {
-            let program = arc.at(f64::from(k) / 8.0);
+    fn matters(&self, block: &Block, arc: &Arc) -> Result<bool> {
+        let (free, ways) = (self.free(), self.ways());
+        let mut model = self.model.ahead();
+        for s in arc.stations() {
+            let program = arc.at(s);
             let q = self.joints(block, &program)?;
-            let goal = self.goal(&q);
-            let sent = self.inverse.solve(&self.model.chain_at(&q), &goal, &q, &self.free()).commands;
+            model.advance(&q, &ways);
+            let solution = self.inverse.solve(model.chain(), &self.goal(&q), &q, &free);
+            if let Some(tolerance) = self.options.arcs
+                && solution.position_left_m > tolerance
+            {
+                return self.not_held(block, model.chain(), &q, tolerance, solution.position_left_m);
+            }
+            let sent = solution.commands;
             let written = self.control.program(&sent, &program);
             for i in 0..program.len() {
                 let half = 0.5 * 10f64.powi(-(self.places(i) as i32));
@@ -230,6 +243,35 @@ impl Follower<'_> {
             }
         }
         Ok(false)
+    }
+
+    /// Refuses an arc that leaves more than its tolerance; names the axes that could mend it, were they placed.
+    fn not_held<T>(
+        &self,
+        block: &Block,
+        chain: &Chain<f64>,
+        q: &[f64],
+        tolerance: f64,
+        left: f64,
+    ) -> Result<T> {
+        let left_by = |axis: usize| {
+            let mut free = self.free();
+            self.control.axes[axis].command.into_iter().for_each(|(c, _)| free[c] = true);
+            self.inverse.solve(chain, &self.goal(q), q, &free).position_left_m
+        };
+        let absent: Vec<usize> = (0..self.status.len())
+            .filter(|i| self.status[*i] != Status::Placed && self.control.axes[*i].command.is_some())
+            .collect();
+        let mending: Vec<usize> = absent.iter().copied().filter(|i| left_by(*i) < 0.5 * left).collect();
+        // Where none mends it alone, it takes several.
+        let axes = if mending.is_empty() { absent } else { mending };
+        let name = |i: usize| self.control.axes[i].address.clone();
+        let fault = CompensateFault::ArcNotHeld {
+            left_um: left * 1e6,
+            tolerance_um: tolerance * 1e6,
+            axes: axes.into_iter().map(name).collect(),
+        };
+        refuse(block, motion_word(block).map_or(0, |w| block.words()[w].span.start), fault)
     }
 
     /// `count` lines in the place of one block: the block itself to the first point and lines behind it, or,
@@ -266,6 +308,12 @@ impl Follower<'_> {
             }
             let words: &[Option<usize>] = if k == own { &motion.words } else { &[] };
             let correction = self.correct(line, &point.q, (k == own).then_some(&*block), words);
+            if let (Some(_), Some(tolerance)) = (arc, self.options.arcs) {
+                let left = self.error(&correction.written.q, &point.q).m;
+                if left > tolerance {
+                    return self.not_held(block, self.model.chain(), &point.q, tolerance, left);
+                }
+            }
             let middle = at(s - 0.5 / count as f64);
             if let Some(sent) = self.between(&written, &correction.written, 0.5) {
                 let wanted = self.joints(block, &middle)?;

@@ -65,6 +65,7 @@ impl Follower<'_> {
                 _ => value,
             };
             self.status[i] = Status::Placed;
+            self.ways.sure[i] = true;
         }
         Ok(target)
     }

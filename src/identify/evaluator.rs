@@ -4,6 +4,7 @@ use super::source::Source;
 use super::stretch::Stretch;
 use super::unknowns::Unknowns;
 use crate::chain::{Chain, Sweep, deviation_jacobian};
+use crate::error_motion::ErrorMotions;
 use crate::lie::{Mat3, Pose, Twist, Wrench};
 use crate::machine::Machine;
 use crate::sensor::{MOST_READINGS, Sensor, SensorState};
@@ -30,6 +31,7 @@ pub(crate) struct Evaluator<'a> {
     pieces: Vec<Piece>,
     terms: &'a [Term],
     coefficients: &'a [f64],
+    motions: &'a ErrorMotions,
     /// Dyads with a deviation that changes from sample to sample, before and behind the joint.
     changing: Vec<usize>,
     carried: Vec<usize>,
@@ -64,6 +66,8 @@ impl<'a> Evaluator<'a> {
             parts: &unknowns.parts,
             terms: &unknowns.varying.terms,
             coefficients: &unknowns.coefficients,
+            // An identification eliminates them.
+            motions: &NO_MOTIONS,
         };
         let state = unknowns.sensor_state(source);
         Self::with(machine, &source.sensor, state, frame.previous_from_w, &dh, values)
@@ -78,7 +82,7 @@ impl<'a> Evaluator<'a> {
         dh: &[Twist<f64>],
         values: Values<'a>,
     ) -> Self {
-        let Values { directions, parts, terms, coefficients } = values;
+        let Values { directions, parts, terms, coefficients, motions } = values;
         let mut nominal: Vec<Pose<f64>> = machine.dyads().iter().map(|d| d.placement.pose()).collect();
         nominal[machine.w_index()] = previous_from_w;
         let piece = |piece: usize| {
@@ -103,7 +107,10 @@ impl<'a> Evaluator<'a> {
             list.dedup();
             list
         };
-        let changing = among(|s| if let Slot::Before(j) = s { Some(j) } else { None });
+        let mut changing = among(|s| if let Slot::Before(j) = s { Some(j) } else { None });
+        changing.extend(motions.joints.iter().map(|motion| motion.dyad));
+        changing.sort_unstable();
+        changing.dedup();
         let carried = among(|s| if let Slot::Carried(j) = s { Some(j) } else { None });
         Evaluator {
             machine,
@@ -114,6 +121,7 @@ impl<'a> Evaluator<'a> {
             pieces,
             terms,
             coefficients,
+            motions,
             changing,
             carried,
         }
@@ -160,15 +168,21 @@ impl<'a> Evaluator<'a> {
         }
     }
 
+    /// Whether deviations change from sample to sample, directions of travel aside.
+    fn changes(&self) -> bool {
+        !(self.terms.is_empty() && self.motions.is_empty())
+    }
+
     /// The machine at a moment: the sweep of `work`, and the totals of the deviations that change.
     pub fn move_to(&self, q: &[f64], moment: Moment, work: &mut Workspace) {
         let piece = &self.pieces[self.piece(moment)];
         let Moment::At(stretch, k) = moment else { return piece.chain.sweep_into(q, &mut work.sweep) };
-        if self.terms.is_empty() {
+        if !self.changes() {
             return piece.chain.sweep_into(q, &mut work.sweep);
         }
         work.before.copy_from_slice(&piece.dh);
         work.behind.fill(Twist::zero(0.0));
+        self.motions.add(self.machine, q, stretch.directions(k), &mut work.before);
         let mut columns = stretch.features.iter();
         for ((term, coefficient), features) in
             self.terms.iter().zip(self.coefficients).zip(&mut work.features)
@@ -334,7 +348,7 @@ impl<'a> Evaluator<'a> {
         let drive = self.machine.drive(dyad).expect("a measured joint has a drive");
         let displacement: f64 = drive.terms.iter().map(|(c, factor)| factor * q[*c]).sum();
         let xi = self.joint_twist(dyad);
-        let varying = matches!(moment, Moment::At(..)) && !self.terms.is_empty();
+        let varying = matches!(moment, Moment::At(..)) && self.changes();
         let dh = if varying {
             work.before[dyad] + work.behind[dyad]
         } else {
@@ -356,7 +370,10 @@ pub(crate) struct Values<'a> {
     pub parts: &'a [Vec<Twist<f64>>],
     pub terms: &'a [Term],
     pub coefficients: &'a [f64],
+    pub motions: &'a ErrorMotions,
 }
+
+static NO_MOTIONS: ErrorMotions = ErrorMotions { joints: Vec::new() };
 
 fn along(xi: Twist<f64>, dh: Twist<f64>) -> f64 {
     xi.v.dot(dh.v) + xi.w.dot(dh.w)

@@ -473,7 +473,7 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
                 let mut residuals =
                     evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, with_rows);
                 for (i, row) in rows.chunks_exact(own_width).enumerate() {
-                    motions.columns(machine, q, row, &mut columns);
+                    motions.columns(machine, q, stretch.directions(k), row, &mut columns);
                     residuals[i] -= columns.iter().zip(&unknowns.motions).map(|(x, y)| x * y).sum::<f64>();
                 }
                 let e2 = standardised(&residuals[..count], &sigmas);

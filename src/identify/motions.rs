@@ -1,19 +1,24 @@
 //! Room for the error motions of the axes, `docs/model.md` (32): what no axis is free of and no constant deviation holds.
 //!
-//! Every joint may deviate smoothly along its travel, in all six components, by a small part of its tolerance. That is no part of the
-//! model that is found: it is eliminated from the normal equations, so that it neither bends the constants nor counts as noise.
+//! Every joint may deviate smoothly along its travel, in all six components, by a small part of its tolerance. That is eliminated from the
+//! normal equations, so that it neither bends the constants nor counts as noise, and told beside them.
 
-use std::f64::consts::PI;
+use std::f64::consts::TAU;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::source::Sources;
+use crate::error_motion::{ErrorMotions, HARMONICS, JointMotion, direction_of, harmonics};
+use crate::lie::Twist;
 use crate::machine::{JointKind, Machine};
+use crate::variation::Directions;
 
-/// Functions of one joint: cosine and sine, once and twice.
-const FUNCTIONS: usize = 4;
-/// Columns of one joint.
-const OF_JOINT: usize = 6 * FUNCTIONS;
+/// Functions of one joint and component: cosine and sine of every harmonic.
+const FUNCTIONS: usize = 2 * HARMONICS;
+/// Columns of one joint: those of its deviation, and two of its play.
+const OF_JOINT: usize = 6 * FUNCTIONS + 2;
+/// By what share of its prior play varies along the travel, standard deviation.
+const PLAY_VARIES: f64 = 0.3;
 
 /// The error motions that a fit leaves room for.
 #[derive(Clone, Debug, Default)]
@@ -27,15 +32,17 @@ struct Room {
     dyad: usize,
     /// Displacement at which the functions begin, m or rad.
     from: f64,
-    /// Their argument per displacement: a turn of a rotary joint is a turn, the travel seen of a linear one half a turn.
-    rate: f64,
-    /// Standard deviation of every component, m and rad.
+    /// Displacement of one period: a turn of a rotary joint, twice the travel seen of a linear one, m or rad.
+    period: f64,
+    /// Standard deviation of every component in the first harmonic, m and rad; in harmonic `h` one over `h` of it.
     size: [f64; 6],
+    /// Standard deviation by which half the play varies, m or rad; 0 where the model has no play here.
+    play: f64,
 }
 
 impl Motions {
-    /// Room for `share` of every joint's tolerance; none for 0.
-    pub fn new(machine: &Machine, sources: &Sources, share: f64) -> Self {
+    /// Room for `share` of every joint's tolerance; none for 0. `directions`: of whose axes the play may vary.
+    pub fn new(machine: &Machine, sources: &Sources, share: f64, directions: Option<&Directions>) -> Self {
         if share <= 0.0 {
             return Motions::default();
         }
@@ -52,12 +59,13 @@ impl Motions {
         let room = |(j, joint): (usize, &crate::machine::Joint)| {
             let (low, high) = seen(j);
             let moves = high - low > 1e-9;
-            let (from, rate) = match joint.kind {
-                JointKind::Revolute => (0.0, 1.0),
-                JointKind::Prismatic => (low, PI / (high - low)),
+            let (from, period) = match joint.kind {
+                JointKind::Revolute => (0.0, TAU),
+                JointKind::Prismatic => (low, 2.0 * (high - low)),
             };
             let size = machine.tolerance(j).to_array().map(|t| share * t);
-            moves.then_some(Room { dyad: j, from, rate, size })
+            let play = directions.and_then(|directions| directions.play(machine, j)).unwrap_or(0.0);
+            moves.then_some(Room { dyad: j, from, period, size, play: PLAY_VARIES * play })
         };
         Motions { joints: machine.joints().filter_map(room).collect() }
     }
@@ -67,21 +75,60 @@ impl Motions {
         OF_JOINT * self.joints.len()
     }
 
-    /// The columns of a reading, each over the standard deviation of its coefficient, from its row over the deviations.
-    pub fn columns(&self, machine: &Machine, q: &[f64], row: &[f64], columns: &mut [f64]) {
+    /// The error motions of these values, over the standard deviations of their coefficients.
+    pub fn found(&self, values: &[f64]) -> ErrorMotions {
+        let joint = |(room, values): (&Room, &[f64])| {
+            let twist = |h: usize, which: usize| {
+                let of = |k: usize| room.size[k] * values[FUNCTIONS * k + 2 * h + which] / (h + 1) as f64;
+                Twist::from_array(std::array::from_fn(of))
+            };
+            JointMotion {
+                dyad: room.dyad,
+                from: room.from,
+                period: room.period,
+                cosines: std::array::from_fn(|h| twist(h, 0)),
+                sines: std::array::from_fn(|h| twist(h, 1)),
+                play: [0, 1].map(|i| room.play * values[6 * FUNCTIONS + i]),
+            }
+        };
+        ErrorMotions { joints: self.joints.iter().zip(values.chunks_exact(OF_JOINT)).map(joint).collect() }
+    }
+
+    /// The columns of a reading, each over the standard deviation of its coefficient, from its row over the deviations. `directions`: of
+    /// all commands, where the model depends on them.
+    pub fn columns(&self, machine: &Machine, q: &[f64], directions: &[i8], row: &[f64], columns: &mut [f64]) {
         if self.joints.is_empty() {
             return;
         }
         let displacements = machine.displacements(q);
         for (room, columns) in self.joints.iter().zip(columns.chunks_exact_mut(OF_JOINT)) {
-            let (sin, cos) = (room.rate * (displacements[room.dyad] - room.from)).sin_cos();
-            let functions = [cos, sin, cos * cos - sin * sin, 2.0 * sin * cos];
+            let functions = functions(TAU * (displacements[room.dyad] - room.from) / room.period);
+            let (columns, of_play) = columns.split_at_mut(6 * FUNCTIONS);
+            of_play.fill(0.0);
+            if room.play > 0.0
+                && let Some(joint) = &machine.dyads()[room.dyad].joint
+            {
+                let along = joint.twist().to_array().into_iter().zip(&row[6 * room.dyad..]);
+                let along = along.map(|(xi, by)| xi * by).sum::<f64>() * room.play;
+                let direction = direction_of(machine, room.dyad, directions);
+                of_play.iter_mut().zip(functions).for_each(|(column, f)| *column = along * direction * f);
+            }
             for (k, columns) in columns.chunks_exact_mut(FUNCTIONS).enumerate() {
                 let block = row[6 * room.dyad + k] * room.size[k];
                 columns.iter_mut().zip(functions).for_each(|(column, f)| *column = block * f);
             }
         }
     }
+}
+
+/// Cosine and sine of every harmonic, each over its number: smooth motions fade so.
+fn functions(u: f64) -> [f64; FUNCTIONS] {
+    let all = harmonics(u);
+    std::array::from_fn(|i| {
+        let (cos, sin) = all[i / 2];
+        let function = if i % 2 == 0 { cos } else { sin };
+        function / (i / 2 + 1) as f64
+    })
 }
 
 /// Normal equations with the error motions eliminated.

@@ -30,12 +30,6 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// So that every reading counts half as much.
-    pub fn count_half(&mut self) {
-        self.length *= std::f64::consts::SQRT_2;
-        self.angle *= std::f64::consts::SQRT_2;
-    }
-
     pub fn of(self, quantity: Quantity) -> f64 {
         if quantity == Quantity::Angle { self.angle } else { self.length }
     }
@@ -239,7 +233,7 @@ fn part(
             for (i, plain) in plain.chunks_exact(own_width).enumerate() {
                 let (row, columns) = own[i * width..(i + 1) * width].split_at_mut(own_width);
                 row.copy_from_slice(plain);
-                room.motions.columns(evaluator.machine, q, row, columns);
+                room.motions.columns(evaluator.machine, q, stretch.directions(*k), row, columns);
                 left[i] -= columns.iter().zip(room.values).map(|(x, y)| x * y).sum::<f64>();
             }
             let residuals = &left[..count];

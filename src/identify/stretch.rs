@@ -21,10 +21,10 @@ pub(crate) struct Stretch {
 }
 
 impl Stretch {
-    /// Directions of travel of all commands at sample `k`.
+    /// Directions of travel of all commands at sample `k`; empty where nothing depends on them.
     #[inline]
     pub fn directions(&self, k: usize) -> &[i8] {
-        &self.motion.directions[k * self.commands..(k + 1) * self.commands]
+        self.motion.directions.get(k * self.commands..(k + 1) * self.commands).unwrap_or_default()
     }
 
     /// Commands at sample `k`, m or rad.

@@ -159,6 +159,12 @@ pub enum MachineFault {
         /// What is wrong.
         what: String,
     },
+    /// An error motion of a calibration that is none.
+    #[error("{what}")]
+    BadErrorMotion {
+        /// What is wrong.
+        what: String,
+    },
 }
 
 impl MachineFault {
@@ -205,6 +211,7 @@ impl MachineFault {
             UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
             BadPieces { .. } => "write the pieces as `calibrate --directions` does".into(),
             BadEffect { .. } => "write the effects as `diagnose -o` does, or take this one out".into(),
+            BadErrorMotion { .. } => "write error motions as `calibrate --error-motions` does".into(),
         }
     }
 }

@@ -141,6 +141,10 @@ impl Layout {
             }
             let meaning = meaning(machine, measured, &cell.name);
             let unit = unit(&cell, meaning).map_err(fail)?;
+            if meaning.is_none() && unit.quantity == Quantity::One && cell.name.ends_with("_direction") {
+                let known = machine.commands().to_vec();
+                return Err(fail(Fault::DirectionOfNothing { name: cell.name, known }.into()));
+            }
             let role = meaning.map_or(Role::Channel(channels.len()), |(role, _)| role);
             if let Role::Channel(_) = role {
                 channels.push(Channel { name: cell.name.clone(), unit });
@@ -243,14 +247,6 @@ impl Layout {
                 let warning =
                     format!("line {line}: header key `{key}` has no meaning for measurement `{word}`");
                 draft.warnings.push(warning);
-            }
-        }
-        for column in self.columns.iter().filter(|c| matches!(c.role, Role::Channel(_))) {
-            if column.name.ends_with("_direction") {
-                let name = &column.name;
-                draft
-                    .warnings
-                    .push(format!("column `{name}` is read as an extra channel: no command has that name"));
             }
         }
         Ok(())

@@ -190,6 +190,14 @@ pub enum RecordingFault {
         /// Number of the first, from 1.
         first: usize,
     },
+    /// A direction of approach of something that is no command.
+    #[error("column `{name}` is the direction of approach of no joint that is commanded")]
+    DirectionOfNothing {
+        /// Name of the column.
+        name: String,
+        /// Names of the commands.
+        known: Vec<String>,
+    },
     /// A joint that the machine has and the recording lacks.
     #[error("joint \"{joint}\" has no column")]
     MissingJoint {
@@ -343,6 +351,13 @@ impl RecordingFault {
             }
             BadColumn { .. } => "write NAME[unit], as in `x[mm]`; a pure number is `NAME[1]`".into(),
             DuplicateColumn { .. } => "leave one of the two out, or give it another name".into(),
+            DirectionOfNothing { known, .. } => {
+                let names: Vec<String> = known.iter().map(|c| format!("`{c}_direction`")).collect();
+                format!(
+                    "write {}; a channel of its own takes a name that does not end so",
+                    names.join(" or ")
+                )
+            }
             MissingJoint { joint, similar: Some((number, name)), .. } => {
                 format!("column {number} is named `{name}`: write `{joint}`, case matters")
             }

@@ -12,6 +12,9 @@ use crate::machine::{JointKind, Machine};
 use crate::units::Unit;
 use form::{BacklashForm, FaultsForm, Triple, WidthForm};
 
+/// Where the form of such a file is taught.
+const GUIDE: &str = "docs/simulate.md shows the form of a faults file";
+
 /// Faults of one machine, m and rad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
@@ -82,7 +85,7 @@ impl Faults {
     /// # Errors
     /// [`Error::File`], [`Error::Ron`] or [`Error::Simulation`], the last two with line and column.
     pub fn open(path: impl AsRef<Path>, machine: &Machine) -> Result<Faults> {
-        Faults::from_document(&Document::open(path)?, machine)
+        Faults::from_document(&Document::open(path)?.guided(GUIDE), machine)
     }
 
     /// Reads from a text; `file` is only the name that messages use.
@@ -90,16 +93,11 @@ impl Faults {
     /// # Errors
     /// As [`Faults::open`].
     pub fn parse(file: impl AsRef<Path>, text: &str, machine: &Machine) -> Result<Faults> {
-        Faults::from_document(&Document::new(file, text.to_string())?, machine)
+        Faults::from_document(&Document::new(file, text.to_string())?.guided(GUIDE), machine)
     }
 
     fn from_document(document: &Document, machine: &Machine) -> Result<Faults> {
-        let form: FaultsForm = document.read().map_err(|error| match error {
-            Error::Ron { place, message, mend } if mend.starts_with("docs/") => {
-                Error::Ron { place, message, mend: "docs/simulate.md shows the form of a faults file".into() }
-            }
-            other => other,
-        })?;
+        let form: FaultsForm = document.read()?;
         Reader { machine, form: &form }.faults().map_err(|Fail { path, message, mend }| Error::Simulation {
             place: document.place_of(&path),
             message,

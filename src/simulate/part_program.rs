@@ -42,6 +42,8 @@ pub struct Drive {
     pub corner: f64,
     /// Samples a second.
     pub rate: f64,
+    /// Leaves out the samples of the approach: the rapid motion at the start or, without any, the first block that moves.
+    pub without_approach: bool,
 }
 
 /// An NC program as a course. Variables, sub-programs, cycles and frames are not evaluated: a program that needs them is refused with
@@ -149,6 +151,7 @@ impl Course for PartProgram {
                 tip: false,
                 q: self.start.clone(),
                 feed: None,
+                approach: Approach::Before,
                 ended: false,
             },
             queue: VecDeque::new(),
@@ -174,7 +177,18 @@ struct Reader<'a, R> {
     q: Vec<f64>,
     /// The last `F`, in programmed units.
     feed: Option<f64>,
+    approach: Approach,
     ended: bool,
+}
+
+/// How far the program has come in its approach.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Approach {
+    /// Nothing has moved.
+    Before,
+    /// Rapid motion only.
+    Rapid,
+    Over,
 }
 
 impl<R: BufRead> Reader<'_, R> {
@@ -247,6 +261,7 @@ impl<R: BufRead> Reader<'_, R> {
             linear: false,
             speed: 1.0,
             dwell: seconds,
+            approach: self.approach != Approach::Over,
             line,
             tip: self.tip,
             tangents: None,
@@ -265,7 +280,7 @@ impl<R: BufRead> Reader<'_, R> {
         if self.state.modes().units == Some(Units::Inch) { 0.0254 } else { 1e-3 }
     }
 
-    fn segment(&self, block: &Block, motion: &Motion) -> Result<Segment> {
+    fn segment(&mut self, block: &Block, motion: &Motion) -> Result<Segment> {
         let source = self.source;
         let mut end = self.now.clone();
         for (c, value) in end.iter_mut().enumerate() {
@@ -308,6 +323,10 @@ impl<R: BufRead> Reader<'_, R> {
                 ));
             }
         };
+        segment.approach = self.approach == Approach::Before || (self.approach == Approach::Rapid && rapid);
+        if self.approach != Approach::Over {
+            self.approach = if rapid { Approach::Rapid } else { Approach::Over };
+        }
         segment.measure(&source.linear);
         segment.speed = self.speed(&segment, rapid);
         Ok(segment)
@@ -482,13 +501,14 @@ impl<R: BufRead> Running<'_, R> {
                 if since < lasts || (self.finished && since < lasts + 1.0 / source.drive.rate) {
                     let part = if segment.length > 0.0 { profile.at(since) / segment.length } else { 1.0 };
                     let (point, line, tip) = (segment.at(part), segment.line, segment.tip);
+                    let recorded = !(source.drive.without_approach && segment.approach);
                     source.commands(&point, tip, &mut self.q, line)?;
                     self.next += 1;
                     return Ok(Some(Sample {
                         time,
                         q: self.q.clone(),
                         directions: None,
-                        recorded: true,
+                        recorded,
                         at: At::Line(line),
                     }));
                 }

@@ -219,7 +219,10 @@ impl Plant {
 
     /// Whether there is more than constant deviations.
     pub fn varies(&self) -> bool {
-        !(self.backlash.is_empty() && self.varying.is_empty() && self.by_direction.varying.is_constant())
+        !(self.backlash.is_empty()
+            && self.varying.is_empty()
+            && self.by_direction.varying.is_constant()
+            && self.by_direction.motions.is_empty())
     }
 
     /// Whether deviations depend on position: play, or what [`Plant::with_varying`] added.
@@ -401,6 +404,13 @@ impl Plant {
             if let Some(joint) = &self.machine.dyads()[*j].joint {
                 touch(&mut state.deviations, *j, joint.twist().times(error));
             }
+        }
+        let motions = &self.by_direction.motions.joints;
+        let keyed = !motions.is_empty() && self.by_direction.varying.directions.is_some();
+        let directions = if keyed { state.tracker.directions() } else { Vec::new() };
+        for motion in motions {
+            let j = motion.dyad;
+            touch(&mut state.deviations, j, motion.at(&self.machine, s[j], &directions));
         }
         for (j, deviation) in &self.varying {
             touch(&mut state.deviations, *j, deviation(s));

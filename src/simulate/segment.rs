@@ -14,6 +14,8 @@ pub(super) struct Segment {
     pub speed: f64,
     /// Standstill behind it, s.
     pub dwell: f64,
+    /// Whether it belongs to the approach, before the program's own motion.
+    pub approach: bool,
     pub line: usize,
     /// Whether linear coordinates are those of the tool centre point in frame `w`.
     pub tip: bool,

@@ -75,6 +75,9 @@ path         commands from a table (--input COMMANDS.csv)"
     /// coordinates [default: on; program: as it says]
     #[arg(long, value_enum, value_name = "ON|OFF", help_heading = "Test")]
     pub tcp: Option<OnOff>,
+    /// program: without the rapid motion at the start (without any, the first block that moves)
+    #[arg(long, help_heading = "Test")]
+    pub without_approach: bool,
     /// cone: rotary commands with the opposite sign of those that aim the tool, as the paper's printed programs have them
     #[arg(long, help_heading = "Test")]
     pub reverse_rotary: bool,
@@ -383,7 +386,11 @@ impl Args {
             ("--dwell", self.dwell.is_some(), &turning),
             ("--step", self.step.is_some(), &turning),
         ];
-        let of_program = [("--rapid", self.rapid.is_some()), ("--corner", self.corner.is_some())];
+        let of_program = [
+            ("--rapid", self.rapid.is_some()),
+            ("--corner", self.corner.is_some()),
+            ("--without-approach", self.without_approach),
+        ];
         let hold = ("--hold", !self.hold.is_empty(), [Rotary, Cone, Circle, Program]);
         let useless = given.into_iter().find(|(_, given, sorts)| *given && !sorts.contains(&sort));
         useless

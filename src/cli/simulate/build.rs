@@ -341,6 +341,7 @@ fn drive(args: &Args, balls: &Balls) -> Outcome<Drive> {
         rotary_acceleration: 1000f64.to_radians(),
         corner: args.corner.unwrap_or(5f64.to_radians()),
         rate: rate(args),
+        without_approach: args.without_approach,
     })
 }
 
