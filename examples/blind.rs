@@ -113,7 +113,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         println!("{}", table::terminal(&score, kind));
     }
     if let Some(file) = &arguments.report {
-        let text = report(arguments)?;
+        let text = between_marks(file, &report(arguments)?)?;
         std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))?;
     }
     if arguments.write.is_none() && arguments.judge.is_none() && arguments.report.is_none() {
@@ -137,12 +137,30 @@ fn engine(arguments: &Arguments) -> Result<Engine, String> {
     Ok(engine)
 }
 
+/// Lines between which the tables stand in a file that says more.
+const MARKS: [&str; 2] = ["<!-- blind cases -->", "<!-- end of blind cases -->"];
+
+/// The file with new tables between its marks; at its end where it has none.
+fn between_marks(file: &Path, tables: &str) -> Result<String, String> {
+    let old = if file.exists() {
+        std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?
+    } else {
+        String::new()
+    };
+    let [open, close] = MARKS;
+    let (before, after) = match (old.split_once(open), old.split_once(close)) {
+        (Some((before, _)), Some((_, after))) => (before.to_string(), after.to_string()),
+        _ => (format!("{old}\n"), "\n".to_string()),
+    };
+    Ok(format!("{before}{open}\n\n{tables}\n{close}{after}"))
+}
+
 /// Draws both kinds into a folder of its own, judges, and renders what came out.
 fn report(arguments: &Arguments) -> Result<String, String> {
     let folder = std::env::temp_dir().join(format!("kincal-blind-report-{}", std::process::id()));
     let engine = engine(arguments)?;
     let (count, seed) = (arguments.count, arguments.seed);
-    let mut out = String::from("# Diagnosis: blind cases\n\n");
+    let mut out = String::from("## Blind cases\n\n");
     let _ = writeln!(
         out,
         "Written by `cargo run --release --example blind -- --report docs/diagnosis.md --count {count} --seed {seed}`.\n"
@@ -157,7 +175,7 @@ fn both(folder: &Path, engine: &Engine, count: usize, seed: u64, out: &mut Strin
         let own = folder.join(word);
         harness::write(&own, kind, None, seed, count)?;
         let score = harness::judge(&own, engine)?;
-        let _ = writeln!(out, "## {word}: {} cases\n\n{}", score.cases, table::markdown(&score, kind));
+        let _ = writeln!(out, "### {word}: {} cases\n\n{}", score.cases, table::markdown(&score, kind));
         let _ = writeln!(out, "{}\n{}", table::confusion(&score), table::calibration(&score));
         let methods = [Baseline::Ranked, Baseline::Stepwise, Baseline::Lasso];
         let mut others = Vec::new();
@@ -166,7 +184,7 @@ fn both(folder: &Path, engine: &Engine, count: usize, seed: u64, out: &mut Strin
         }
         let _ = writeln!(
             out,
-            "### What other methods say of the same cases\n\nThey are given the generator's own textbook, which the engine does not know.\n\n{}",
+            "#### What other methods say of the same cases\n\nThey are given the generator's own textbook, which the engine does not know.\n\n{}",
             table::side_by_side(&others, kind)
         );
         if !score.broken.is_empty() {

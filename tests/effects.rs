@@ -160,9 +160,9 @@ fn every_family_is_finite_at_every_place_of_every_machine() {
             assert!(!skipped.reason.is_empty(), "{stem}: {}", skipped.effect);
         }
     }
-    // A recording of a few seconds is too short for what takes eight hours.
+    // A recording of a few seconds is too short for what takes eight hours, and its samples are too far apart for a grating.
     let missing: Vec<&str> = library.names().into_iter().filter(|n| !seen.contains(*n)).collect();
-    assert_eq!(missing, ["daily_drift"]);
+    assert_eq!(missing, ["interpolation_error", "daily_drift"]);
 }
 
 #[test]

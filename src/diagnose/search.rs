@@ -78,6 +78,8 @@ const WORTH: f64 = 0.2;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
 const OWN_SHAPE: f64 = 0.004;
 const OTHER_SHAPE: f64 = 0.001;
+/// A tone is heard in the edges of every other shape.
+const TONE: f64 = 0.01;
 /// A second line of the same family at the same place takes away at least this part of what the first does.
 const REPEATED: f64 = 0.15;
 /// More effects are not looked for.
@@ -201,12 +203,11 @@ impl Search<'_> {
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let space = self.beside(&active, None);
             let rivals = self.rivals(&active);
-            let Some(best) =
-                rivals.iter().take_while(|r| r.weight > ENTER).find(|r| !self.repeats(r, &active))
-            else {
-                break;
-            };
-            let structure = self.leftover(&space).energy;
+            let before = self.leftover(&space);
+            let is_chance = |r: &Rival| r.weight <= ENTER * if self.is_tone(r) { before.band } else { 1.0 };
+            let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
+            let Some(best) = worthy.find(|r| !is_chance(r) && !self.repeats(r, &active)) else { break };
+            let structure = before.energy;
             if best.score.gain < self.shape_error(best, &active) || 2.0 * best.score.gain < WORTH * structure
             {
                 break;
@@ -226,6 +227,11 @@ impl Search<'_> {
         active
     }
 
+    /// Whether it is a wave in time: noise whose colour is not quite known has many.
+    fn is_tone(&self, rival: &Rival) -> bool {
+        self.candidates[rival.candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
+    }
+
     /// Whether it has the name and place of what was found already and is little beside it: that is its shape.
     fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
         let of = |candidate: usize| (&self.candidates[candidate].effect, self.candidates[candidate].place);
@@ -237,8 +243,10 @@ impl Search<'_> {
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place.
     fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
-        let share = |effect: &Active| {
-            if place(effect.candidate) == place(rival.candidate) { OWN_SHAPE } else { OTHER_SHAPE }
+        let share = |effect: &Active| match place(effect.candidate) == place(rival.candidate) {
+            true => OWN_SHAPE,
+            false if self.is_tone(rival) => TONE,
+            false => OTHER_SHAPE,
         };
         active.iter().map(|effect| share(effect) * effect.score.gain).sum()
     }
