@@ -4,15 +4,15 @@
 use crate::calibration::CalibratedMachine;
 use crate::diagnose::{Diagnosis, Request, diagnose};
 use crate::effects::Library;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::identify::{Fit, Options, calibrate};
-use crate::lie::Twist;
+use crate::lie::{Twist, Vec3};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 use crate::simulate::{
-    At, Claims, Course, Faults, Instrument, Plant, Run, Sample, Samples, Style, cone, random_deviations,
-    recordings,
+    Balls, Claims, Faults, Figure, Instrument, Pace, Plant, Rounding, Run, Sense, Session, Style, Turning,
+    Turns, random_deviations, rest,
 };
 
 /// The reference machine's file.
@@ -23,9 +23,14 @@ pub const CONCEALED: &str = include_str!("demo.ron");
 const BAR: f64 = 0.1;
 /// Noise of the ballbar, m.
 const NOISE: f64 = 5e-7;
-/// Poses of a cone in each sense of travel, and the time from one to the next, s.
-const POSES: usize = 900;
-const STEP: f64 = 0.025;
+/// From one sample to the next the bar turns by this, rad; samples a second.
+const STEP: f64 = 0.4 * std::f64::consts::PI / 180.0;
+const RATE: f64 = 40.0;
+/// Seconds from the beginning of one recording to that of the next.
+const APART: f64 = 60.0;
+/// By how much the tool leads the bar, rad: where both turn in step, the bar stands still as the tool sees it, and a good part of the errors
+/// with it.
+const LEAD: f64 = std::f64::consts::FRAC_PI_3;
 /// Inclinations of the cones, degrees.
 const INCLINATIONS: [u8; 2] = [10, 30];
 
@@ -46,22 +51,6 @@ pub struct Demo {
     pub diagnosed: CalibratedMachine,
 }
 
-/// Poses that follow each other by the same time.
-struct Poses(Vec<Vec<f64>>);
-
-impl Course for Poses {
-    fn samples(&self) -> Result<Samples<'_>> {
-        let sample = |(k, q): (usize, &Vec<f64>)| Sample {
-            time: STEP * k as f64,
-            q: q.clone(),
-            directions: None,
-            recorded: true,
-            at: At::Pose(k + 1),
-        };
-        Ok(Box::new(self.0.iter().enumerate().map(sample).map(Ok)))
-    }
-}
-
 /// Runs it; the same seed gives the same figures. `progress` is told what is being done.
 ///
 /// # Errors
@@ -74,22 +63,43 @@ pub fn demo(seed: u64, progress: &dyn Fn(&str)) -> Result<Demo> {
     let plant = Plant::new(&truth).with_faults(&Faults::parse("demo.ron", CONCEALED, &machine)?);
     let mut instrument = Instrument::new(Sensor::Distance { absolute: false }, NOISE, 0.0);
     instrument.state.length = BAR;
-    let mut runs = Vec::new();
-    for degrees in INCLINATIONS {
-        let path = cone(&machine, BAR, f64::from(degrees).to_radians(), POSES).ok_or_else(|| {
-            Error::Undetermined {
-                what: format!("the reference machine does not reach the cone inclined by {degrees}°"),
-                mend: String::new(),
-            }
-        })?;
-        runs.push(Run {
-            course: Box::new(Poses(path)),
+    let turns = Turns {
+        from: 0.0,
+        to: std::f64::consts::TAU,
+        senses: vec![Sense::Positive, Sense::Negative],
+        parts: 1,
+        repeat: 1,
+        overshoot: 0.0,
+        dwell: 0.0,
+        paces: vec![Pace::Steps(STEP)],
+    };
+    let mut texts = Vec::new();
+    for (i, degrees) in INCLINATIONS.into_iter().enumerate() {
+        let figure = Figure::Cone {
+            half_apex: std::f64::consts::FRAC_PI_4,
+            inclination: f64::from(degrees).to_radians(),
+            lead: LEAD,
+            tool_centre_point: true,
+            reversed: false,
+        };
+        let origin = Vec3([0.0; 3]);
+        let balls = Balls { workpiece_point_w: origin, tool_point_t: origin, length: BAR };
+        let held = rest(&machine);
+        let course = Turning::new(&machine, figure, balls, &held, turns.legs(), RATE, Rounding::default())?;
+        let run = Run {
+            course: Box::new(course),
             instrument: instrument.clone(),
             claims: Claims::default(),
             directions: false,
-        });
+        };
+        // Each recording is a run of its own: what the machine did before it is not known.
+        let (runs, style) = ([run], Style::si());
+        let mut session = Session::new(&plant, &runs, &style, 0.0, seed.wrapping_add(u64::from(degrees)))?
+            .beginning_at(APART * i as f64);
+        let mut text = Vec::new();
+        session.record(&mut text, |_| ())?;
+        texts.push(String::from_utf8_lossy(&text).into_owned());
     }
-    let texts = self::recordings(&plant, &runs, &Style::si(), seed)?;
     let read = (texts.iter().zip(INCLINATIONS)).map(|(text, degrees)| {
         Recording::from_bytes(&format!("bk4_{degrees}deg.csv"), text.clone().into_bytes(), &machine)
     });
