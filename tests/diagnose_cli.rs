@@ -50,7 +50,9 @@ fn recording(folder: &Folder, play: f64) -> String {
     let count = 360;
     for k in 0..4 * count {
         let (leg, step) = (k / count, k % count);
-        let (c, direction) = if leg % 2 == 0 { (step, 1.0) } else { (count - step, -1.0) };
+        let c = if leg % 2 == 0 { step } else { count - step };
+        // Where it turns it has come from the leg before.
+        let direction = if (k.max(1) - 1) / count % 2 == 0 { 1.0 } else { -1.0 };
         // Twelve uniform numbers less six: nearly normal.
         let noise: f64 = (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
         let error = 3.0 - direction * play / 2.0 + NOISE * noise;

@@ -174,12 +174,9 @@ fn against(curve: &Curve, finding: Option<&Finding>, most: usize) -> Markup {
         }
     }
     if finding.is_some() {
-        let stride = points.len().div_ceil(most).max(1);
         let line = |run: &Vec<CurvePoint>| -> Vec<(f64, f64)> {
-            let last = run.len().saturating_sub(1);
-            (run.iter().enumerate().filter(|(k, _)| k % stride == 0 || *k == last))
-                .map(|(_, p)| (p.x * x_factor, p.effect * factor))
-                .collect()
+            let line: Vec<(f64, f64)> = run.iter().map(|p| (p.x * x_factor, p.effect * factor)).collect();
+            envelope(&line, (most * run.len()).div_ceil(points.len()).max(2))
         };
         let runs = curve.runs.iter().filter(|run| run.len() > 1).map(line).collect();
         layers.push(Layer {

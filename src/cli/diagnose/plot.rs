@@ -187,10 +187,11 @@ pub(super) fn envelope(all: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
     let stretch = (2 * all.len()).div_ceil(most.max(2));
     let mut kept = Vec::new();
     for stretch in all.chunks(stretch) {
-        let by = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
-        if let (Some(least), Some(most)) = (stretch.iter().min_by(by), stretch.iter().max_by(by)) {
+        let ends = || stretch.iter().enumerate();
+        let by = |a: &(usize, &(f64, f64)), b: &(usize, &(f64, f64))| a.1.1.total_cmp(&b.1.1);
+        if let (Some(least), Some(most)) = (ends().min_by(by), ends().max_by(by)) {
             let (first, last) = if least.0 <= most.0 { (least, most) } else { (most, least) };
-            kept.extend([*first, *last]);
+            kept.extend([*first.1, *last.1]);
         }
     }
     kept
