@@ -17,11 +17,13 @@ mod search;
 mod shape;
 mod space;
 mod spectrum;
+mod traces;
 mod waves;
 
 pub use finding::{
     Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size, Unexplained, Where,
 };
+pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
 
 use std::cell::RefCell;
 

@@ -250,25 +250,38 @@ fn redacted(text: &str) -> String {
 
 #[test]
 fn demo_needs_no_input() {
-    assert_snapshot!(redacted(&done(&["demo"])));
-    let value = json(&done(&["demo", "--json", "-"]));
-    for key in [
-        "machine",
-        "samples",
-        "rms_m",
-        "recordings",
-        "parameters",
-        "combinations",
-        "rank",
-        "unknowns",
-        "warnings",
-    ] {
-        assert!(value.get(key).is_some(), "{key} in {:?}", keys(&value));
-    }
+    let folder = Folder::new("demo");
+    let in_folder = |args: &[&str]| {
+        let output = Command::new(PROGRAM).args(args).current_dir(&folder.0).output().expect("it runs");
+        assert_eq!((output.status.code(), err(&output).as_str()), (Some(0), ""), "{args:?}");
+        out(&output)
+    };
+    let text = in_folder(&["demo", "--json", "demo.json"]);
+    assert_snapshot!(redacted(&text));
+    assert_eq!(folder.names(), ["demo.json", "kincal_demo.html"], "what it says that it writes");
+    let value = json(&folder.read("demo.json"));
+    let found = |i: usize, key: &str| value["findings"][i][key].as_str().expect("a text").to_string();
+    let mut names: Vec<_> = (0..2).map(|i| (found(i, "effect"), found(i, "at"))).collect();
+    names.sort();
+    let concealed = [("backlash".to_string(), "a".to_string()), ("cyclic_error".into(), "c".into())];
+    assert_eq!(names, concealed, "what was concealed");
+    assert_eq!(value["findings"].as_array().map(Vec::len), Some(2), "and nothing else");
     let rms = |of: &str| value["rms_m"][of].as_f64().expect("a number");
-    assert!(rms("geometric") < 6e-7 && rms("nominal") > 1e-5);
-    assert_eq!(done(&["demo"]), done(&["demo", "--seed", "1"]), "the same seed, the same bytes");
-    assert_ne!(done(&["demo"]), done(&["demo", "--seed", "2"]));
+    assert!(rms("nominal") > 1e-5 && rms("geometric") > 1e-6 && rms("final") < 6e-7);
+    assert!(folder.read("kincal_demo.html").contains("backlash"));
+}
+
+#[test]
+fn demo_repeats_itself_by_its_seed() {
+    let folder = Folder::new("demo-seeds");
+    let run = |seed: &str| {
+        let report = folder.path("report.html");
+        let text = done(&["demo", "--seed", seed, "--report", &report]);
+        (text, folder.read("report.html"))
+    };
+    let (first, again, other) = (run("2"), run("2"), run("3"));
+    assert!(first == again, "the same seed, the same bytes");
+    assert!(first.0 != other.0 && first.1 != other.1);
 }
 
 // Calibrate and predict.
@@ -420,7 +433,7 @@ fn json_goes_to_a_file_or_alone_to_standard_output_and_quiet_says_nothing() {
         vec!["check", MACHINE, "--poses", "1"],
         vec!["calibrate", MACHINE, &rec],
         vec!["predict", &ron, &rec],
-        vec!["demo"],
+        vec!["demo", "--report", &folder.path("demo.html")],
     ] {
         assert_eq!(done(&[&args[..], &["--quiet"]].concat()), "");
         json(&done(&[&args[..], &["--quiet", "--json", "-"]].concat()));

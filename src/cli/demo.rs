@@ -1,40 +1,54 @@
 //! `kincal demo`
 
 use std::fmt::Write;
+use std::path::{Path, PathBuf};
 
 use kincal::demo::demo;
 
-use super::Common;
-use super::calibrate::render;
 use super::output::{Outcome, check_outputs, length};
+use super::{Common, calibrate, diagnose};
+
+/// Where the report goes unless told otherwise.
+const REPORT: &str = "kincal_demo.html";
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// Seed of errors and noise
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 2)]
     seed: u64,
+    /// Where to write the report with its pictures: one HTML file
+    #[arg(long, value_name = "OUT.html", default_value = REPORT)]
+    report: PathBuf,
     #[command(flatten)]
     common: Common,
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.common.json_file()], &[])?;
-    let demo = demo(args.seed)?;
+    let report: &Path = &args.report;
+    check_outputs(&[Some(report), args.common.json_file()], &[])?;
+    let progress = args.common.progress();
+    let demo = demo(args.seed, &|text| progress.say(text));
+    drop(progress);
+    let demo = demo?;
     let mut text = format!(
         "The AC table-tilting reference machine, with random errors of its declared tolerances in every frame, is measured by a \
          simulated ballbar\non two cones in both senses of travel (ISO 10791-6 BK4, inclined by 10 and 30 deg; bar 100 mm, noise \
-         0.5 um): {} distances.\n\n",
+         0.5 um): {} distances.\nConcealed besides: axis a has 12 arcsec of play, the worm of c errs by 6.2 arcsec to and fro with each of its 72 teeth.\n\n\
+         First, what constant geometry explains (kincal calibrate):\n\n",
         demo.fit.samples
     );
-    text.push_str(&render(&demo.fit, false));
+    text.push_str(&calibrate::render(&demo.fit, false));
     if let Some(rms) = demo.fit.rms_m {
         let _ = writeln!(
             text,
-            "\nThe bar's deviation falls from {} to {} RMS.",
+            "\nThe bar's deviation falls from {} to {} RMS, and not to the noise.\n\nThen, what the geometry leaves over (kincal diagnose):\n",
             length(rms.nominal),
             length(rms.geometric)
         );
     }
+    text.push_str(&diagnose::render(&demo.diagnosis));
+    diagnose::write_report(report, &demo.diagnosis)?;
+    let _ = writeln!(text, "\nreport with pictures written to {}", report.display());
     args.common.say(&text);
-    args.common.write_json(&demo.fit)
+    args.common.write_json(&demo.diagnosis)
 }

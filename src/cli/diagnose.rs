@@ -1,7 +1,11 @@
 //! `kincal diagnose`
 
+mod page;
+mod plot;
+mod text;
+
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use kincal::Machine;
 use kincal::diagnose::{Diagnosis, Request, diagnose};
@@ -9,7 +13,8 @@ use kincal::effects::Library;
 use kincal::recording::Recording;
 
 use super::Common;
-use super::output::{Outcome, check_outputs, length, open_machine, open_recording, write_whole};
+use super::output::{Outcome, check_outputs, open_machine, open_recording, write_whole};
+pub(crate) use text::render;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -28,12 +33,18 @@ pub(crate) struct Args {
     /// Where to write the calibrated machine with what was found
     #[arg(short, long, value_name = "CALIBRATED.ron")]
     output: Option<PathBuf>,
+    /// Where to write the report with its pictures: one HTML file
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.output.as_deref(), args.common.json_file()], &args.recordings)?;
+    check_outputs(
+        &[args.output.as_deref(), args.report.as_deref(), args.common.json_file()],
+        &args.recordings,
+    )?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings: Vec<Recording> =
         args.recordings.iter().map(|path| open_recording(path, &machine)).collect::<Result<_, _>>()?;
@@ -67,43 +78,21 @@ pub(crate) fn run(args: &Args) -> Outcome {
             let _ = out.write_all(model.to_ron().as_bytes());
             Ok(())
         })?;
-        let _ = writeln!(text, "written to {}", path.display());
+        let _ = writeln!(text, "\nwritten to {}", path.display());
+    }
+    if let Some(path) = &args.report {
+        write_report(path, &diagnosis)?;
+        let _ = writeln!(text, "\nreport written to {}", path.display());
     }
     args.common.say(&text);
     args.common.write_json(&diagnosis)
 }
 
-fn render(diagnosis: &Diagnosis) -> String {
-    let mut text = format!("{}: {} samples\n", diagnosis.machine, diagnosis.samples);
-    if let Some(noise) = diagnosis.noise_floor_m {
-        let _ = writeln!(text, "noise {}", length(noise));
-    }
-    for finding in &diagnosis.findings {
-        let _ = writeln!(text, "\n{} (probability {:.2})", finding.explanation, finding.probability);
-        if let Some(held) = &finding.held_out_rms_m {
-            let _ = writeln!(
-                text,
-                "  on stretches left out of the fit: {} without it, {} with it",
-                length(held.before),
-                length(held.after)
-            );
-        }
-        for other in &finding.confusable_with {
-            let _ = writeln!(
-                text,
-                "  may also be {} at {} ({:.2}); to tell them apart: {}",
-                other.effect, other.at, other.probability, other.separate_by
-            );
-        }
-    }
-    match &diagnosis.unexplained {
-        Some(unexplained) => {
-            let _ = writeln!(text, "\n{}", unexplained.explanation);
-        }
-        None if diagnosis.findings.is_empty() => {
-            text.push_str("\nconstant geometry explains these recordings to the noise\n");
-        }
-        None => {}
-    }
-    text
+/// The report, whole or not at all.
+pub(crate) fn write_report(path: &Path, diagnosis: &Diagnosis) -> Outcome {
+    write_whole(path, |out| {
+        // Watched: an error here is told of the output.
+        let _ = out.write_all(page::page(diagnosis).as_bytes());
+        Ok(())
+    })
 }

@@ -7,8 +7,10 @@ use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
 use super::search::{Active, ROOM, Rival, Search};
+use super::traces::{self, Traces};
 use crate::effects::{Identified, Library, StoredEffect};
 use crate::identify::BeforeAfter;
+use crate::location::LocationErrors;
 use crate::machine::Machine;
 
 /// Everything that a diagnosis has to say. Numbers in SI; `docs/diagnosis.md` lists the fields.
@@ -45,6 +47,12 @@ pub struct Diagnosis {
     /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
+    /// What its pictures show.
+    #[serde(skip)]
+    pub traces: Traces,
+    /// The geometry as ISO 230-1 location errors.
+    #[serde(skip)]
+    pub location_errors: LocationErrors,
 }
 
 /// An effect that was found, as it is put into the model.
@@ -109,6 +117,8 @@ pub struct Finding {
     pub r#where: Vec<Where>,
     /// What these recordings cannot tell from it.
     pub confusable_with: Vec<Confusable>,
+    /// Part of the mean square that geometry leaves over that goes with it, 0 to 1, the others taken in.
+    pub share: f64,
 }
 
 /// A number of a finding.
@@ -262,6 +272,7 @@ pub(super) fn report(
             held_out_rms_rad: None,
             r#where: wheres(search, &effect.columns),
             confusable_with,
+            share: 0.0,
         });
         kept.push(i);
     }
@@ -299,8 +310,11 @@ pub(super) fn report(
         findings,
         unexplained,
         named,
+        traces: Traces::default(),
+        location_errors: linear.fit.location_errors.clone(),
     };
     folds::fill(search, &told, &mut diagnosis);
+    traces::fill(search, &told, &left_over, machine, &mut diagnosis);
     diagnosis
 }
 

@@ -53,6 +53,7 @@ impl Diagnosis {
                 by.r#final = rms;
             }
         };
+        self.location_errors = fit.location_errors;
         let rms = calibrated.rms();
         last(&mut self.rms_m, fit.rms_m.and(rms.m));
         last(&mut self.rms_rad, fit.rms_rad.and(rms.rad));

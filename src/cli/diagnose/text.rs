@@ -1,0 +1,196 @@
+//! What a diagnosis says on the terminal.
+
+use std::fmt::Write;
+
+use kincal::diagnose::{Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Unexplained, Where};
+use kincal::effects::in_words;
+use kincal::feature::Dimension;
+
+use crate::cli::output::{count, decimals, length};
+
+/// A length or an angle, as people on a shop floor say it: um, mm; arcsec, deg.
+pub(crate) fn amount(si: f64, angle: bool) -> String {
+    if angle { in_words(si, None, Dimension::ANGLE, None) } else { length(si) }
+}
+
+/// Lengths and angles of the same figure, those that there are, with what the second is of.
+fn both<T: Copy>(lengths: Option<T>, angles: Option<T>) -> Vec<(T, bool)> {
+    lengths.map(|x| (x, false)).into_iter().chain(angles.map(|x| (x, true))).collect()
+}
+
+/// Everything.
+pub(crate) fn render(diagnosis: &Diagnosis) -> String {
+    let mut text = head(diagnosis);
+    for (i, finding) in diagnosis.findings.iter().enumerate() {
+        let _ = writeln!(text, "\n{}. {}", i + 1, finding.explanation);
+        for line in about(diagnosis, finding) {
+            let _ = writeln!(text, "   {line}");
+        }
+    }
+    if let Some(unexplained) = &diagnosis.unexplained {
+        let _ = writeln!(text, "\nunexplained: {}", unexplained.explanation);
+        for line in about_unexplained(unexplained) {
+            let _ = writeln!(text, "   {line}");
+        }
+    } else if diagnosis.findings.is_empty() {
+        let _ = writeln!(text, "\n{CALM}");
+    }
+    text
+}
+
+/// Where there is nothing to be found.
+pub(crate) const CALM: &str = "Constant geometry explains these recordings down to their noise: there is nothing else to be found in them.";
+
+/// Machine, recordings, noise, root mean squares.
+fn head(diagnosis: &Diagnosis) -> String {
+    let names = &diagnosis.recordings;
+    let shown = match names.len() {
+        0..=6 => names.join(", "),
+        n => format!("{} ... {}", names[0], names[n - 1]),
+    };
+    let mut text = format!(
+        "{}: {} in {} ({shown})\n",
+        diagnosis.machine,
+        count(diagnosis.samples, "sample", "samples"),
+        count(names.len() as u64, "recording", "recordings"),
+    );
+    for line in figures(diagnosis) {
+        let _ = writeln!(text, "{line}");
+    }
+    text
+}
+
+/// Noise and root mean squares, a line each.
+pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (noise, angle) in both(diagnosis.noise_floor_m, diagnosis.noise_floor_rad) {
+        lines.push(format!("noise of the readings: {}", amount(noise, angle)));
+    }
+    let found = !diagnosis.findings.is_empty();
+    for (rms, angle) in both(diagnosis.rms_m, diagnosis.rms_rad) {
+        let RmsByModel { nominal, geometric, r#final } = rms;
+        let mut line = format!(
+            "RMS of the residuals: {} as declared -> {} with geometry calibrated",
+            amount(nominal, angle),
+            amount(geometric, angle)
+        );
+        if found {
+            let _ = write!(line, " -> {} with what is named below", amount(r#final, angle));
+        }
+        lines.push(line);
+    }
+    for (HeldOutRms { geometric, r#final }, angle) in
+        both(diagnosis.held_out_rms_m, diagnosis.held_out_rms_rad)
+    {
+        let mut line = format!("on stretches left out of the fit: {}", amount(geometric, angle));
+        if found {
+            let _ = write!(line, " -> {}", amount(r#final, angle));
+        }
+        lines.push(line);
+    }
+    lines
+}
+
+/// What there is to say of a finding besides its sentence.
+pub(crate) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
+    let mut lines = vec![format!(
+        "{} at {}, probability {}; it explains {} of what geometry left over",
+        finding.effect,
+        finding.at,
+        probability(finding.probability),
+        percent(finding.share)
+    )];
+    for (HeldOutPair { before, after }, angle) in both(finding.held_out_rms_m, finding.held_out_rms_rad) {
+        lines.push(format!(
+            "held-out error: {} without it -> {} with it",
+            amount(before, angle),
+            amount(after, angle)
+        ));
+    }
+    if let Some(places) = places(&finding.r#where, diagnosis.recordings.len()) {
+        lines.push(format!("it acts in {places}"));
+    }
+    for other in &finding.confusable_with {
+        lines.push(format!(
+            "it may be {} at {} instead (probability {})",
+            other.effect,
+            other.at,
+            probability(other.probability)
+        ));
+    }
+    for (test, of) in tests(finding) {
+        lines.push(format!("next test, to tell {} apart: {test}", of.join(" and ")));
+    }
+    lines
+}
+
+/// Which measurements would tell a finding from its rivals, each with the rivals that it tells apart.
+pub(crate) fn tests(finding: &Finding) -> Vec<(&str, Vec<String>)> {
+    let mut tests: Vec<(&str, Vec<String>)> = Vec::new();
+    for other in &finding.confusable_with {
+        let name = if other.at == finding.at {
+            other.effect.clone()
+        } else {
+            format!("{} at {}", other.effect, other.at)
+        };
+        match tests.iter_mut().find(|(test, _)| *test == other.separate_by) {
+            Some((_, names)) => names.push(name),
+            None => tests.push((&other.separate_by, vec![name])),
+        }
+    }
+    tests
+}
+
+/// What there is to say of a structure without a name.
+pub(crate) fn about_unexplained(unexplained: &Unexplained) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(places) = places(&unexplained.r#where, usize::MAX) {
+        lines.push(format!("it stands out in {places}"));
+    }
+    if unexplained.at != "measurement" {
+        lines.push(format!(
+            "next test: a path on which {0} moves on its own, slowly, to and fro over all of its travel, twice",
+            unexplained.at
+        ));
+    } else {
+        lines.push("next test: the same path once more, and a stretch at rest".into());
+    }
+    lines
+}
+
+/// `rec_1.csv from 0 s to 61 s (80 %), rec_2.csv (20 %)`.
+fn places(list: &[Where], recordings: usize) -> Option<String> {
+    if list.is_empty() {
+        return None;
+    }
+    let place = |place: &Where| {
+        let mut text = place.recording.clone();
+        if let (Some(from), Some(to)) = (place.from_s, place.to_s) {
+            let _ = write!(text, " from {from:.0} s to {to:.0} s");
+        }
+        if recordings > 1 {
+            let _ = write!(text, " ({} of its effect)", percent(place.share_of_misfit));
+        }
+        text
+    };
+    let shown: Vec<String> = list.iter().take(4).map(place).collect();
+    let more = match list.len().saturating_sub(4) {
+        0 => String::new(),
+        n => format!(" and {n} more"),
+    };
+    Some(shown.join(", ") + &more)
+}
+
+/// Two digits, and never a certainty.
+pub(crate) fn probability(p: f64) -> String {
+    match p {
+        p if p > 0.995 => "> 0.99".into(),
+        p if p < 0.005 => "< 0.01".into(),
+        p => format!("{p:.2}"),
+    }
+}
+
+fn percent(share: f64) -> String {
+    let value = 100.0 * share;
+    if value < 0.1 { "less than 0.1 %".into() } else { format!("{value:.*} %", decimals(value, 2)) }
+}
