@@ -54,8 +54,11 @@ pub(super) struct Search<'a> {
     pub priors: Vec<f64>,
     pub progress: &'a dyn Fn(&str),
     /// Rivals that are known, by what has been taken in besides.
-    pub known: RefCell<HashMap<(Option<usize>, Vec<Mark>), Rc<Vec<Rival>>>>,
+    pub known: RefCell<Known>,
 }
+
+/// Rivals by the effect that stood aside and by those that were taken in.
+pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>), Rc<Vec<Rival>>>;
 
 /// What tells an effect that has been taken in: candidate, coefficients and parameters.
 pub(super) type Mark = (usize, usize, Vec<u64>);
