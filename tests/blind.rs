@@ -210,20 +210,36 @@ fn practice_answers_are_read_in_the_same_form() {
     }
 }
 
+/// Standard cases with fewer than 1500 samples among the first 60 of seed 2026 and, clean ones, the first 16 of seed 2027: chosen by
+/// size, and without the three (005, 015, 047) that take longest.
+const SEALED: [(u64, Option<Mode>, &[usize]); 2] =
+    [(2026, None, &[11, 12, 18, 21, 27, 32, 37, 50, 52, 54]), (2027, Some(Mode::Clean), &[2, 15])];
+
 /// The engine on a few sealed cases; the figures of hundreds are in `docs/diagnosis.md`.
 #[test]
 fn the_engine_names_what_a_few_blind_cases_conceal() {
-    let binary = PathBuf::from(env!("CARGO_BIN_EXE_kincal"));
-    let help = std::process::Command::new(&binary).args(["diagnose", "--help"]).output().expect("runs");
-    if !String::from_utf8_lossy(&help.stdout).contains("--output") {
-        println!("skipped: `diagnose` of this build does not write the model, which the judge needs");
-        return;
-    }
     let folder = folder("engine");
-    harness::write(&folder, Kind::Standard, None, 2026, 12).expect("written");
-    let score = harness::judge(&folder, &Engine::new(binary)).expect("readable");
+    let machines = harness::machines();
+    let mut answers = Vec::new();
+    for (seed, mode, numbers) in SEALED {
+        for number in numbers {
+            let mut case = draw(&machines, Kind::Standard, mode, seed, *number);
+            // Its label is its number: the two seeds must not share one.
+            case.number = answers.len();
+            answers.push(case.write(&folder).expect("written"));
+        }
+    }
+    let text = serde_json::to_string(&answers).expect("JSON");
+    std::fs::write(folder.join("answers.json"), text).expect("written");
+    let score =
+        harness::judge(&folder, &Engine::new(PathBuf::from(env!("CARGO_BIN_EXE_kincal")))).expect("readable");
     println!("{}", harness::table::terminal(&score, Kind::Standard));
     assert!(score.broken.is_empty(), "{:?}", score.broken);
-    assert!(score.first.share() >= 0.85, "{:?}", score.first);
-    assert!(score.clean_silent.hits == score.clean_silent.of, "{:?}", score.clean_silent);
+    // Reached: 6 of 6, 1.0, 2 of 2, 0; 1 of 2 odd ones unexplained and the other given wrong names; 1 of 12 worse on the judge's path.
+    assert!(score.first.hits + 1 >= score.first.of, "{:?}: {:?}", score.first, score.failures);
+    assert!(score.f1() >= 0.75, "{}: {:?}", score.f1(), score.failures);
+    assert_eq!(score.clean_silent.hits, score.clean_silent.of, "{:?}", score.failures);
+    assert!(score.needless_one <= 1, "{:?}", score.failures);
+    assert!(score.odd_unexplained.hits >= 1 && score.odd_wrong.hits <= 1, "{:?}", score.failures);
+    assert!(score.judged_worse.hits <= 2, "{:?}", score.judged_worse);
 }
