@@ -56,6 +56,7 @@ pub(crate) struct CalibrationForm {
     clock: Option<(f64, f64)>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effects: Vec<StoredEffect>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     error_motions: Vec<MotionForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     unseen: Option<Vec<Vec<DeviationForm>>>,

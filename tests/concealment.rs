@@ -37,18 +37,20 @@ impl Random {
 struct Instant<'a> {
     /// Time since the first sample of all, s.
     time: f64,
-    /// Commands, m or rad.
-    q: &'a [f64],
-    /// Their exact rates, m/s or rad/s.
-    v: &'a [f64],
+    /// The command in question, m or rad.
+    q: f64,
+    /// Its exact rate, m/s or rad/s.
+    v: f64,
+    /// All commands.
+    all: &'a [f64],
     /// Whether the coolant runs, 0 or 1.
     coolant: f64,
 }
 
 impl Instant<'_> {
-    /// Side from which the play of a joint has been taken up: it never rests on these paths.
-    fn side(&self, c: usize) -> f64 {
-        self.v[c].signum()
+    /// Side from which play has been taken up: no joint ever rests on these paths.
+    fn side(&self) -> f64 {
+        self.v.signum()
     }
 }
 
@@ -60,6 +62,8 @@ struct Law<'a> {
 
 const SAMPLES: usize = 420;
 const STEP_S: f64 = 0.05;
+/// Where the target sits on the tool, m.
+const TARGET_T: Vec3<f64> = Vec3([0.11, 0.02, 0.04]);
 
 /// Two recordings of a point on the tool along smooth paths of all joints, constant deviations and white noise included.
 fn record(folder: &Path, stem: &str, law: &Law, sigma_m: f64, seed: u64) -> (PathBuf, Vec<PathBuf>) {
@@ -102,12 +106,12 @@ fn record(folder: &Path, stem: &str, law: &Law, sigma_m: f64, seed: u64) -> (Pat
             let time = start + k as f64 * STEP_S;
             let q = pose(time);
             let (before, after) = (pose(time - 1e-4), pose(time + 1e-4));
-            let v: Vec<f64> = before.iter().zip(&after).map(|(a, b)| (b - a) / 2e-4).collect();
+            let v = (after[own] - before[own]) / 2e-4;
             // Now and then, by no rhythm.
             let coolant = f64::from(u8::from((0.9 * time).sin() + (0.37 * time + 1.0).sin() > 0.3));
             let mut moved = q.clone();
-            moved[own] += (law.adds)(&Instant { time, q: &q, v: &v, coolant });
-            let p = chain.w_from_t(&moved).translation.0.map(|x| x + sigma_m * random.normal());
+            moved[own] += (law.adds)(&Instant { time, q: q[own], v, all: &q, coolant });
+            let p = chain.w_from_t(&moved).transform(TARGET_T).0.map(|x| x + sigma_m * random.normal());
             let numbers = q.iter().copied().chain([coolant]).chain(p).map(|x| format!("{x:.9}"));
             text += &format!("{time:.3},{}\n", numbers.collect::<Vec<_>>().join(","));
         }
@@ -126,8 +130,11 @@ fn head(machine: &Machine) -> String {
     let columns: Vec<String> =
         machine.commands().iter().enumerate().map(|(c, name)| format!("{name}[{}]", unit(c))).collect();
     format!(
-        "# machine: {}\n# measurement: position\nt[s],{},coolant[1],px[m],py[m],pz[m]\n",
+        "# machine: {}\n# measurement: position\n# tool_point[m]: {}, {}, {}\nt[s],{},coolant[1],px[m],py[m],pz[m]\n",
         machine.name(),
+        TARGET_T.0[0],
+        TARGET_T.0[1],
+        TARGET_T.0[2],
         columns.join(",")
     )
 }
@@ -201,6 +208,8 @@ struct Case<'a> {
     adds: &'a dyn Fn(&Instant) -> f64,
     /// What else explains it quite as well, and has to be left out with it.
     alike: &'a [&'a str],
+    /// Joints on which it depends: where it may be said to be.
+    depends_on: &'a [&'a str],
 }
 
 impl Case<'_> {
@@ -225,24 +234,27 @@ fn foreign() -> Vec<Case<'static>> {
             command: "x",
             effect: "coolant_push",
             sigma_m: MILL,
-            adds: &|i| 6e-6 * i.coolant * (1.0 + 2.0 * i.q[0]),
+            adds: &|i| 6e-6 * i.coolant * (1.0 + 2.0 * i.q),
             alike: &[],
+            depends_on: &["x"],
         },
         Case {
             machine: "xyz_mill",
             command: "z",
             effect: "progressive_pitch",
             sigma_m: MILL,
-            adds: &|i| 6e-6 * (TAU * (i.q[2] / 0.07).powi(2) + 0.8).sin(),
+            adds: &|i| 6e-6 * (TAU * (i.q / 0.07).powi(2) + 0.8).sin(),
             alike: &[],
+            depends_on: &["z"],
         },
         Case {
             machine: "scara",
             command: "q2",
             effect: "differential_mesh",
             sigma_m: ARM,
-            adds: &|i| 150e-6 * (3.0 * i.q[1] + 4.0 * i.q[0] + 0.4).sin(),
+            adds: &|i| 150e-6 * (3.0 * i.q + 4.0 * i.all[0] + 0.4).sin(),
             alike: &[],
+            depends_on: &["q1", "q2"],
         },
     ]
 }
@@ -254,7 +266,7 @@ fn known() -> Vec<Case<'static>> {
             command: "y",
             effect: "backlash",
             sigma_m: MILL,
-            adds: &|i| -5e-6 * i.side(1),
+            adds: &|i| -5e-6 * i.side(),
             alike: &[
                 "position_dependent_backlash",
                 "hysteresis",
@@ -262,14 +274,16 @@ fn known() -> Vec<Case<'static>> {
                 "presliding_friction",
                 "stribeck_friction",
             ],
+            depends_on: &["y"],
         },
         Case {
             machine: "xyz_mill",
             command: "x",
             effect: "cyclic_error",
             sigma_m: MILL,
-            adds: &|i| 5e-6 * (TAU * i.q[0] / 0.020 + 0.3).sin(),
+            adds: &|i| 5e-6 * (TAU * i.q / 0.020 + 0.3).sin(),
             alike: &[],
+            depends_on: &["x"],
         },
         Case {
             machine: "scara",
@@ -278,40 +292,53 @@ fn known() -> Vec<Case<'static>> {
             sigma_m: ARM,
             adds: &|i| if i.time > 31.0 { 150e-6 } else { 0.0 },
             alike: &["setup_slip", "clamp_shift"],
+            depends_on: &["q1"],
         },
         Case {
             machine: "rotary_axis",
             command: "c",
             effect: "encoder_eccentricity",
             sigma_m: MILL,
-            adds: &|i| 100e-6 * (i.q[0] + 0.3).sin(),
+            adds: &|i| 100e-6 * (i.q + 0.3).sin(),
             alike: &[],
+            depends_on: &["c"],
         },
         Case {
             machine: "scara",
             command: "q2",
             effect: "servo_lag",
             sigma_m: ARM,
-            adds: &|i| -0.3e-3 * i.v[1],
+            adds: &|i| -0.3e-3 * i.v,
             alike: &[],
+            depends_on: &["q2"],
         },
     ]
 }
 
+/// `progressive_pitch` is not tried without its file: a wave that runs up in pitch is made up of five others today, each with a name.
 #[test]
-fn what_is_in_no_library_is_not_given_a_wrong_name_and_a_file_of_effects_names_it() {
+fn what_is_in_no_library_is_unexplained_at_a_joint_of_it_and_a_file_of_effects_names_it() {
     for case in foreign() {
         let files = case.record(1);
-        let (plain, with) = (said(&files, &[]), said(&files, &["--effects", FOREIGN]));
-        println!("{} at {}: without the file {plain}; with it {with}", case.effect, case.command);
+        let with = said(&files, &["--effects", FOREIGN]);
+        assert!(with.names(case.effect, case.command), "{} with its file: {with}", case.effect);
+        if case.effect == "progressive_pitch" {
+            continue;
+        }
+        let plain = said(&files, &[]);
+        assert!(!plain.is_wrong(), "{} without its file: {plain}", case.effect);
+        let at = plain.unexplained.unwrap_or_default();
+        assert!(case.depends_on.contains(&at.as_str()), "{} is said to be at {at:?}", case.effect);
     }
 }
 
 #[test]
-fn without_its_family_an_effect_is_unexplained_at_its_place_and_with_it_named() {
+#[ignore = "prints what is said; `cargo test --release --test concealment -- --ignored --nocapture`"]
+fn families_left_out_and_put_back() {
     for case in known() {
         let files = case.record(1);
-        let (plain, with) = (said(&files, &without(&case.all_names())), said(&files, &[]));
-        println!("{} at {}: without the family {plain}; with it {with}", case.effect, case.command);
+        println!("{} at {}, with its family: {}", case.effect, case.command, said(&files, &[]));
+        let plain = said(&files, &without(&case.all_names()));
+        println!("    without {}: {plain}", case.all_names().join(", "));
     }
 }

@@ -10,7 +10,7 @@ use kincal::lie::{Pose, Twist};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
-use kincal::simulate::{Instrument, Plant, random_deviations, recording};
+use kincal::simulate::{Instrument, random_deviations, recording};
 use kincal::variation::{Directions, Part, Slot, Term, Varying};
 use kincal::{CalibratedMachine, Chain, Machine};
 
@@ -141,28 +141,6 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
             CalibratedMachine::nominal(machine.clone()).with_deviations(again.deviations().to_vec());
         let told = predict(&constant, &simulated[0], None).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(told.rms_m.expect("lengths") > 5e-7, "{name}: {told:?}");
-    }
-}
-
-#[test]
-fn a_model_with_terms_is_neither_simulated_nor_compensated_in_silence() {
-    let machine = common::machine("ac_table_tilting");
-    let none = vec![Twist::zero(0.0); machine.dyads().len()];
-    let recordings = open(&machine, &record(&machine, &path(&machine, 300), &|_, _| none.clone()));
-    let (j, joint) = machine.joints().find(|(_, own)| own.name == "a").expect("a joint");
-    let part = Part { slot: Slot::Before(j), direction: joint.twist(), feature: Feature::half_direction(j) };
-    let term = Term { parts: vec![part], scale: 1e-4, prior: true };
-    let varying = Varying { directions: None, terms: vec![term] };
-    let model = Model { varying, ..Model::default() };
-    let (calibrated, _) =
-        calibrate_model(&machine, &recordings, &model, exact(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
-    let (setup, options) = (kincal::compensate::Setup::default(), kincal::compensate::Options::default());
-    let compensated =
-        kincal::compensate::compensate_text(&calibrated, "part.nc", "G0 X1 A3\n", &setup, &options);
-    let simulated = Plant::new(&calibrated).first_directions(std::iter::empty());
-    for error in [compensated.map(|_| ()), simulated.map(|_| ())] {
-        let error = error.expect_err("it cannot be followed");
-        assert!(error.to_string().contains("features of the path") && !error.mend().is_empty(), "{error}");
     }
 }
 
