@@ -44,6 +44,7 @@ use crate::recording::Recording;
 pub use crate::rms::Rms;
 use crate::units::Quantity;
 use crate::variation::{Variation, Varying};
+use evidence::Sizes;
 use information::Information as Info;
 use motions::Motions;
 use normal::{Noise, Normal, Sums, Tally};
@@ -84,6 +85,11 @@ pub struct Model {
 
 /// Direction parts other than play: factors on their prior among which the data choose.
 const BUT_PLAY: [f64; 5] = [1.0, 0.3, 0.1, 0.03, 0.01];
+/// Error motions: factors on their lengths and on their angles that the data weigh.
+const LENGTHS: [f64; 3] = [0.5, 1.0, 2.0];
+const ANGLES: [f64; 3] = [0.5, 1.0, 2.0];
+/// Rounds of choosing factors; the second sees what the first has changed.
+const SIZE_ROUNDS: usize = 2;
 /// Rounds of re-estimating the noise from the residuals.
 const NOISE_ROUNDS: usize = 12;
 
@@ -151,24 +157,36 @@ pub fn calibrate_model(
         problem.motions = Motions::new(machine, &sources, model.error_motions, varying.directions.as_ref());
     }
     let mut found = settle(&problem, options.solver, placed.unknowns, noise)?;
+    let room = problem.motions.clone();
     let fitting = |but_play: f64| Layout::new(machine, &sources, varying, but_play);
-    let candidates = || BUT_PLAY.into_iter().map(|factor| (factor, fitting(factor)));
-    let but_play = match &varying.directions {
-        // Without room for error motions, those would speak for direction parts.
-        Some(_) if problem.motions.len() > 0 => {
-            evidence::smallest_likely(&found.solution, &layout, candidates())
+    // Without room for error motions, those would speak for direction parts.
+    let but_play: &[f64] = if varying.directions.is_some() { &BUT_PLAY } else { &[1.0] };
+    let candidates: Vec<(f64, Layout)> = but_play.iter().map(|factor| (*factor, fitting(*factor))).collect();
+    let mut sizes = Sizes { but_play: 1.0, motions: [1.0; 2] };
+    for _ in 0..SIZE_ROUNDS {
+        let likely = evidence::likely(
+            &found.solution,
+            problem.layout,
+            &problem.motions,
+            sizes.motions,
+            &candidates,
+            &of_motions(),
+        );
+        let Some(likely) = likely.filter(|likely| likely.differ(&sizes)) else { break };
+        sizes = likely;
+        problem.motions = room.sized(sizes.motions);
+        if let Some((_, layout)) = candidates.iter().find(|(factor, _)| *factor == sizes.but_play) {
+            problem.layout = layout;
         }
-        _ => 1.0,
-    };
-    let layout = fitting(but_play);
-    problem.layout = &layout;
-    if but_play != 1.0 {
-        found = settle(&problem, options.solver, found.solution.unknowns, found.noise)?;
+        let mut start = found.solution.unknowns;
+        start.motions.clear();
+        found = settle(&problem, options.solver, start, found.noise)?;
     }
+    let layout = problem.layout;
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
-    let information = Info::new(&found.solution.normal.matrix, &layout, prior, open);
+    let information = Info::new(&found.solution.normal.matrix, layout, prior, open);
     let mut calibrated = calibrated(machine, &sources, &found);
-    calibrated.unseen = Some(unseen::unseen(machine, &layout, &information));
+    calibrated.unseen = Some(unseen::unseen(machine, layout, &information));
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
     let unknowns = &found.solution.unknowns;
     if !varying.is_constant() || problem.motions.len() > 0 {
@@ -182,6 +200,11 @@ pub fn calibrate_model(
         });
     }
     Ok((calibrated, fit))
+}
+
+/// All pairs of factors on error motions.
+fn of_motions() -> Vec<[f64; 2]> {
+    LENGTHS.iter().flat_map(|length| ANGLES.iter().map(move |angle| [*length, *angle])).collect()
 }
 
 /// What nobody has stated: frames, tool points, zeros and lengths of the set-ups.

@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::source::Sources;
 use crate::error_motion::{ErrorMotions, HARMONICS, JointMotion, direction_of, harmonics};
@@ -68,6 +68,19 @@ impl Motions {
             moves.then_some(Room { dyad: j, from, period, size, play: PLAY_VARIES * play })
         };
         Motions { joints: machine.joints().filter_map(room).collect() }
+    }
+
+    /// The same with other sizes: factors on the standard deviations of lengths and of angles. That of play stays.
+    pub fn sized(&self, sizes: [f64; 2]) -> Self {
+        let sized =
+            |room: &Room| Room { size: std::array::from_fn(|k| sizes[k / 3] * room.size[k]), ..room.clone() };
+        Motions { joints: self.joints.iter().map(sized).collect() }
+    }
+
+    /// The factor of every column under [`Motions::sized`].
+    pub fn factors(&self, sizes: [f64; 2]) -> DVector<f64> {
+        let of_joint = |i: usize| if i < 6 * FUNCTIONS { sizes[i / FUNCTIONS / 3] } else { 1.0 };
+        DVector::from_fn(self.len(), |i, _| of_joint(i % OF_JOINT))
     }
 
     /// Columns.
@@ -139,8 +152,20 @@ pub(crate) struct Eliminated {
     pub gain: f64,
     /// Those values.
     pub values: Vec<f64>,
+    /// Triangle of their posterior information.
+    posterior: Option<Cholesky<f64, Dyn>>,
+}
+
+impl Eliminated {
     /// Effective number of parameters that they have used up.
-    pub used: f64,
+    pub fn used(&self) -> f64 {
+        self.posterior.as_ref().map_or(0.0, |own| self.values.len() as f64 - own.inverse().trace())
+    }
+
+    /// Half the logarithm of the determinant of their posterior information.
+    pub fn half_log_det(&self) -> f64 {
+        self.posterior.as_ref().map_or(0.0, |own| own.l_dirty().diagonal().iter().map(|x| x.ln()).sum())
+    }
 }
 
 /// Eliminates the last unknowns, those of the motions, which stand at `values` with a prior of unit deviation:
@@ -155,7 +180,13 @@ pub(crate) fn eliminate(matrix: &DMatrix<f64>, gradient: &DVector<f64>, values: 
     let Some(cholesky) = Cholesky::new(own) else {
         let matrix = matrix.view((0, 0), (kept, kept)).into_owned();
         let gradient = gradient.rows(0, kept).into_owned();
-        return Eliminated { matrix, gradient, gain: 0.0, values: values.as_slice().to_vec(), used: 0.0 };
+        return Eliminated {
+            matrix,
+            gradient,
+            gain: 0.0,
+            values: values.as_slice().to_vec(),
+            posterior: None,
+        };
     };
     let step = cholesky.solve(&pull);
     let solved = cholesky.solve(&cross);
@@ -164,6 +195,6 @@ pub(crate) fn eliminate(matrix: &DMatrix<f64>, gradient: &DVector<f64>, values: 
         gradient: gradient.rows(0, kept) - cross.tr_mul(&step),
         gain: 0.5 * pull.dot(&step) - 0.5 * values.norm_squared(),
         values: (&values + &step).as_slice().to_vec(),
-        used: count as f64 - cholesky.inverse().trace(),
+        posterior: Some(cholesky),
     }
 }

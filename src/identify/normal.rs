@@ -96,6 +96,8 @@ pub(crate) struct Normal {
     /// Best values of the error motions, which are eliminated from the rest, and the number of parameters that they have used up.
     pub motions: Vec<f64>,
     pub used_by_motions: f64,
+    /// Matrix and gradient before that, with the error motions at zero; none where no room is left for them.
+    pub whole: Option<(DMatrix<f64>, DVector<f64>)>,
 }
 
 /// Samples with a smaller weight say nothing about the noise.
@@ -110,6 +112,7 @@ impl Normal {
             tallies: vec![Tally::default(); sources],
             motions: Vec::new(),
             used_by_motions: 0.0,
+            whole: None,
         }
     }
 }
@@ -188,8 +191,13 @@ pub(crate) fn accumulate(
     if motions.len() > 0 {
         let rest = eliminate(&normal.matrix, &normal.gradient, &values);
         normal.loss -= rest.gain;
-        (normal.matrix, normal.gradient) = (rest.matrix, rest.gradient);
-        (normal.motions, normal.used_by_motions) = (rest.values, rest.used);
+        normal.used_by_motions = rest.used();
+        let matrix = std::mem::replace(&mut normal.matrix, rest.matrix);
+        let gradient = std::mem::replace(&mut normal.gradient, rest.gradient);
+        let seen_from_zero =
+            gradient + matrix.columns(layout.len, values.len()) * DVector::from_column_slice(&values);
+        normal.whole = Some((matrix, seen_from_zero));
+        normal.motions = rest.values;
     }
     Ok(normal)
 }
