@@ -78,8 +78,8 @@ pub struct Model {
     pub dead_bands: Vec<Option<f64>>,
     /// As many samples of each piece are used, evenly spread; the others judge the result.
     pub samples: Option<u64>,
-    /// Room for smooth error motions of every joint, over the tolerance of its dyad, `docs/model.md` (32); 0 for none. They do
-    /// not bend the deviations, and are kept beside them.
+    /// Room for smooth error motions of every joint, over the tolerance of its dyad, `docs/model.md` (32); 0 for none. The data weigh
+    /// factors on it, (33). The motions do not bend the deviations, and are kept beside them.
     pub error_motions: f64,
 }
 
