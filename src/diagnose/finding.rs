@@ -208,6 +208,11 @@ pub(super) fn report(
     let (by_names, by_shapes) =
         ((energy(&search.base) - energy(&names)).max(0.0), (energy(&names) - energy(&full)).max(0.0));
     let total = (by_names + by_shapes + left.energy).max(1e-300);
+    let (surprise, bare) = (folds::surprise(search, active, true), folds::surprise(search, active, false));
+    eprintln!(
+        "DBG surprise {surprise:?} {bare:?} names {by_names:.1} shapes {by_shapes:.1} left {:.1} total {total:.1}",
+        left.energy
+    );
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
         || by_shapes > SHAPE * total;
     let noise_of = |angle: bool| {

@@ -40,6 +40,72 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
     }
 }
 
+/// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
+/// `Σ_f (e_f - r_f)·r_f - p`, (67). `None` where there are too few rows.
+pub(super) fn surprise(search: &Search, active: &[Active], shapes: bool) -> Option<(f64, f64)> {
+    let rows = search.rows;
+    let mut white = rows.linear.constant.clone();
+    rows.whiten(&mut white);
+    for own in
+        active.iter().flat_map(|effect| [Some(&effect.columns), shapes.then_some(&effect.shape)]).flatten()
+    {
+        let at = white.ncols();
+        white = white.insert_columns(at, own.ncols(), 0.0);
+        white.columns_mut(at, own.ncols()).copy_from(own);
+    }
+    let owner = owners(search)?;
+    let grams = grams(&white, &rows.residual, &owner);
+    let identity = DMatrix::<f64>::identity(white.ncols(), white.ncols());
+    let (gram, b) =
+        grams.iter().fold((identity.clone(), DVector::zeros(white.ncols())), |(gram, b), (own, toward)| {
+            (gram + own, b + toward)
+        });
+    let all = Cholesky::new(gram.clone())?;
+    let x = all.solve(&b);
+    let p = white.ncols() as f64 - all.inverse().trace();
+    let (mut sum, mut variance) = (0.0, 0.0);
+    for (own, toward) in &grams {
+        let part = all.solve(own);
+        variance += 2.0 * part.tr_mul(&part.transpose()).trace();
+        let without = Cholesky::new(&gram - own)?.solve(&(&b - toward));
+        // (e - r)·r = (x - x_without)ᵀ Xᵀ(y - X x)
+        sum += (&x - without).dot(&(toward - own * &x));
+    }
+    Some((sum - p, variance.sqrt()))
+}
+
+/// The fold of each row.
+fn owners(search: &Search) -> Option<Vec<usize>> {
+    let linear = search.rows.linear;
+    let mut owner = vec![0; linear.residual.len()];
+    for span in &linear.spans {
+        let count = span.samples.1 - span.samples.0;
+        if count < 2 * FOLDS {
+            return None;
+        }
+        let rows = span.rows.0..span.rows.1;
+        for (fold, sample) in owner[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
+            *fold = (sample - span.samples.0) * FOLDS / count;
+        }
+    }
+    Some(owner)
+}
+
+/// Normal equations of the whitened rows of each fold.
+fn grams(
+    white: &DMatrix<f64>,
+    residual: &DVector<f64>,
+    owner: &[usize],
+) -> Vec<(DMatrix<f64>, DVector<f64>)> {
+    let one = |fold: usize| {
+        let own: Vec<usize> = (0..owner.len()).filter(|row| owner[*row] == fold).collect();
+        let columns = white.select_rows(&own);
+        let residual = residual.select_rows(&own);
+        (columns.tr_mul(&columns), columns.tr_mul(&residual))
+    };
+    (0..FOLDS).map(one).collect()
+}
+
 /// Normal equations of all samples and of each fold.
 struct Folds {
     /// Columns as they are, m and rad.
@@ -62,27 +128,10 @@ impl Folds {
             raw = raw.insert_columns(at, count, 0.0);
             raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * ROOM));
         }
-        let mut owner = vec![0; linear.residual.len()];
-        for span in &linear.spans {
-            let count = span.samples.1 - span.samples.0;
-            if count < 2 * FOLDS {
-                return None;
-            }
-            let rows = span.rows.0..span.rows.1;
-            for (fold, sample) in owner[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
-                *fold = (sample - span.samples.0) * FOLDS / count;
-            }
-        }
+        let owner = owners(search)?;
         let mut white = raw.clone();
         rows.whiten(&mut white);
-        let grams = (0..FOLDS)
-            .map(|fold| {
-                let own: Vec<usize> = (0..owner.len()).filter(|row| owner[*row] == fold).collect();
-                let columns = white.select_rows(&own);
-                let residual = rows.residual.select_rows(&own);
-                (columns.tr_mul(&columns), columns.tr_mul(&residual))
-            })
-            .collect();
+        let grams = grams(&white, &rows.residual, &owner);
         Some(Folds { raw, owner, grams })
     }
 

@@ -205,6 +205,11 @@ impl Whitener {
         to.iter_mut().zip(column).zip(&self.scale).for_each(|((to, x), scale)| *to = scale * x);
     }
 
+    /// The row that the noise of this one remembers, and how much of it.
+    pub fn memory(&self, row: usize) -> Option<(usize, f64)> {
+        (self.previous[row] != NONE).then(|| (self.previous[row] as usize, self.rho[row]))
+    }
+
     /// How many rows count.
     pub fn count(&self) -> usize {
         self.scale.iter().filter(|s| **s > 0.0).count()

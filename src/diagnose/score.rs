@@ -179,12 +179,16 @@ impl<'a> Rows<'a> {
         if let Some(gains) = self.harmonics(candidate, field).filter(|_| all.len() > WAVES) {
             // Far from a line there is next to nothing: evidence of no gain.
             let none = -(candidate.coefficients.len() as f64);
-            table.iter_mut().zip(&gains).for_each(|(best, gain)| {
-                *best = Some(Best { evidence: 0.5 * gain / heat + none, length: lengths[0], gain: *gain });
-            });
             let peaks = peaks(&gains);
-            peaks.iter().for_each(|i| table[*i] = None);
             self.table(candidate, &candidate.grid, field, None, heat, &peaks, &mut table);
+            // What waves have in common with the space, and sizes that are not usual, take as much from those that are not looked at.
+            let exact = peaks.iter().filter_map(|i| Some(table[*i].as_ref()?.gain));
+            let rough = peaks.iter().map(|i| 0.5 * gains[*i]).fold(0.0, f64::max);
+            let part = (exact.fold(0.0, f64::max) / rough.max(1e-300)).min(1.0);
+            for (best, gain) in table.iter_mut().zip(&gains).filter(|(best, _)| best.is_none()) {
+                let gain = 0.5 * part * gain;
+                *best = Some(Best { evidence: gain / heat + none, length: lengths[0], gain });
+            }
             return summary(&candidate.grid, &table, &peaks);
         }
         let kept = self.coarse.features(i, candidate, &self.linear.samples);

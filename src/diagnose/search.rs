@@ -1,7 +1,7 @@
 //! Which effects together explain the recordings best: forward, backward, swaps, each against all candidates.
 
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
@@ -202,7 +202,12 @@ impl Search<'_> {
             );
         }
         self.swap(&mut active);
+        let mut tried: HashSet<Vec<usize>> = HashSet::new();
         while active.len() < MOST {
+            // Swaps may throw out what the next step takes in again.
+            if !tried.insert(active.iter().map(|effect| effect.candidate).collect()) {
+                break;
+            }
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let space = self.beside(&active, None);
             let rivals = self.rivals(&active);

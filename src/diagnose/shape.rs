@@ -13,6 +13,8 @@ use crate::lie::Twist;
 
 /// A column of the shape may have this part of the effect's amplitude.
 const PART: f64 = 0.3;
+/// Shapes that are smaller than this part of the noise, all rows together, are left aside.
+const HIDDEN: f64 = 0.2;
 /// Orders of curves along travel and time.
 const CURVE: usize = 12;
 /// Orders of what multiplies the effect's own features.
@@ -41,7 +43,14 @@ pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DM
             }
         }
     }
-    if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) }
+    if columns.is_empty() { DMatrix::zeros(n, 0) } else { thinned(DMatrix::from_columns(&columns)) }
+}
+
+/// Columns with the same covariance `S Sᵀ`, without the combinations of them that noise hides.
+fn thinned(columns: DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = columns.tr_mul(&columns).symmetric_eigen();
+    let kept: Vec<usize> = (0..columns.ncols()).filter(|i| eigen.eigenvalues[*i] > HIDDEN * HIDDEN).collect();
+    columns * eigen.eigenvectors.select_columns(&kept)
 }
 
 /// Answers of the readings to the directions of the effect, or to the mixture of them that was found.

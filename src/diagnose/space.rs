@@ -1,6 +1,6 @@
 //! What is known already: geometry and the effects found so far, marginalised out of everything that is judged, `docs/diagnosis.md` (62).
 
-use nalgebra::{DMatrix, DMatrixView, DVector, SVD};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, SVD};
 
 /// The precision of whitened rows after columns with Gaussian priors have been marginalised: `M = I - W Wᵀ`.
 #[derive(Clone)]
@@ -43,20 +43,22 @@ impl Space {
         &self.w
     }
 
-    /// With further columns, each times its prior standard deviation.
+    /// With further columns, each times its prior standard deviation: `M - M C (I + CᵀM C)⁻¹ CᵀM`.
     pub fn with(&self, columns: &DMatrix<f64>) -> Self {
-        let mut space = self.clone();
-        for column in columns.column_iter() {
-            let mc = space.apply(&column.into_owned());
-            let length = 1.0 + column.dot(&mc);
-            if length > 1.0 {
-                let at = space.w.ncols();
-                space.w = space.w.insert_column(at, 0.0);
-                space.w.set_column(at, &(mc / length.sqrt()));
-            }
+        if columns.ncols() == 0 {
+            return self.clone();
         }
-        space.wt = space.w.transpose();
-        space
+        let mut mc = columns.clone();
+        mc.gemm(-1.0, &self.w, &self.along(&columns.as_view()), 1.0);
+        let inner = DMatrix::identity(columns.ncols(), columns.ncols()) + columns.tr_mul(&mc);
+        let Some(factor) = Cholesky::new(inner) else { return self.clone() };
+        // W = M C L⁻ᵀ, so that Wᵀ = L⁻¹ (M C)ᵀ.
+        let mut added = mc.transpose();
+        factor.l_dirty().solve_lower_triangular_mut(&mut added);
+        let (old, new) = (self.wt.nrows(), added.nrows());
+        let mut wt = self.wt.clone().resize_vertically(old + new, 0.0);
+        wt.rows_mut(old, new).copy_from(&added);
+        Space { w: wt.transpose(), wt }
     }
 
     /// `M x`.

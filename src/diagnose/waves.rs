@@ -4,6 +4,9 @@ use super::score::{Field, Rows};
 use super::spectrum::Spectrum;
 use crate::effects::Candidate;
 
+/// Rows on which the energy of waves is judged.
+const MEMORIES: usize = 256;
+
 impl Rows<'_> {
     /// Energy that a pair of sine and cosine of one phase takes away, at every point of the grid, as if it had nothing in common with
     /// the space; `None` if the features are no such pair, or the phase is no multiple of one column.
@@ -38,26 +41,40 @@ impl Rows<'_> {
             let largest = factors.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
             for coefficient in candidate.coefficients.iter().filter(|c| c.order == 2 * pair) {
                 let mut weights = vec![0.0; x.len()];
-                let mut energy = 0.0;
-                let mut white = vec![0.0; dual.len()];
+                let mut energies = vec![0.0; factors.len()];
                 for part in &coefficient.parts {
                     let answer = self.answer(part.slot, part.direction);
                     answer.iter().zip(&dual).enumerate().for_each(|(row, (a, d))| {
                         weights[self.linear.sample[row]] += a * d;
                     });
-                    self.whitener.plain(&answer, &mut white);
-                    energy += white.iter().map(|x| x * x).sum::<f64>();
+                    self.wave_energies(&answer, &x, &factors, &mut energies);
                 }
-                if energy <= 0.0 {
+                if energies.iter().all(|energy| *energy <= 0.0) {
                     continue;
                 }
                 let spectrum = Spectrum::new(&x, &weights, largest)?;
-                factors
-                    .iter()
-                    .zip(&mut gains)
-                    .for_each(|(f, gain)| *gain += spectrum.power(*f) / (0.5 * energy));
+                for ((f, energy), gain) in factors.iter().zip(&energies).zip(&mut gains) {
+                    *gain += if *energy > 0.0 { spectrum.power(*f) / (0.5 * energy) } else { 0.0 };
+                }
             }
         }
         Some(gains)
+    }
+
+    /// Adds the energy of `answer` times a wave, whitened, at every factor of the phase: noise that remembers weighs fast waves more
+    /// than slow ones.
+    fn wave_energies(&self, answer: &[f64], x: &[f64], factors: &[f64], energies: &mut [f64]) {
+        let mut plain = vec![0.0; answer.len()];
+        self.whitener.plain(answer, &mut plain);
+        let step = plain.len().div_ceil(MEMORIES).max(1);
+        for row in (0..plain.len()).step_by(step) {
+            let energy = plain[row] * plain[row] * step as f64;
+            let (before, rho) = self.whitener.memory(row).unwrap_or((row, 0.0));
+            let advance = x[self.linear.sample[row]] - x[self.linear.sample[before]];
+            for (f, sum) in factors.iter().zip(energies.iter_mut()) {
+                *sum += energy
+                    * (1.0 + rho * rho - if rho > 0.0 { 2.0 * rho * (f * advance).cos() } else { 0.0 });
+            }
+        }
     }
 }
