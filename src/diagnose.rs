@@ -12,6 +12,7 @@ mod held_out;
 mod leftover;
 mod model;
 mod noise;
+mod outliers;
 mod score;
 mod search;
 mod shape;
@@ -23,6 +24,7 @@ mod waves;
 pub use finding::{
     Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size, Unexplained, Where,
 };
+pub use outliers::{Outliers, WithoutOutliers};
 pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
 
 use std::cell::RefCell;
@@ -46,6 +48,8 @@ pub struct Request {
 
 /// Rounds of judging the noise from what is left.
 const NOISE_ROUNDS: usize = 3;
+/// Where chance is that much larger than the noise, the effects are chosen once more against it.
+const HOT: f64 = 3.0;
 
 /// Diagnoses what constant geometry leaves over in these recordings.
 ///
@@ -81,11 +85,19 @@ pub fn diagnose(
             candidates: &candidates.all,
             priors: priors.clone(),
             progress,
+            heat: 1.0,
             known: RefCell::default(),
         };
         active = search.run(&active);
         let judged = noise_of(&linear, &finding::residual_of(&search, &active), &runs, &out, &facts);
         if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
+            let heat = search.leftover(&search.beside(&active, None)).heat;
+            if heat < HOT {
+                return Ok(finding::report(&search, &active, machine, library, &noise));
+            }
+            // Much is left, as it always is on real machines: the simplest names that stand out from it count.
+            let search = Search { heat, known: RefCell::default(), ..search };
+            active = search.run(&active);
             return Ok(finding::report(&search, &active, machine, library, &noise));
         }
         noise = judged;
@@ -109,6 +121,11 @@ fn noise_of(
     let estimate = |angle: bool| {
         let own: Vec<&Vec<usize>> =
             runs.iter().filter(|run| run.first().is_some_and(|r| linear.angle[*r] == angle)).collect();
+        if facts.approached
+            && let Some(noise) = noise::repeated(linear, left, &own, out)
+        {
+            return noise;
+        }
         noise::estimate(left, &own, out, smooth)
     };
     let (length, angle) = (estimate(false), estimate(true));

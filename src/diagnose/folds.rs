@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::finding::{Diagnosis, HeldOutPair, HeldOutRms, rms_of};
-use super::search::{Active, ROOM, Search};
+use super::search::{Active, Search};
 
 /// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
 const FOLDS: usize = 5;
@@ -60,7 +60,7 @@ impl Folds {
             let own = rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)?;
             let (at, count) = (raw.ncols(), effect.columns.ncols());
             raw = raw.insert_columns(at, count, 0.0);
-            raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * ROOM));
+            raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * effect.score.room));
         }
         let mut owner = vec![0; linear.residual.len()];
         for span in &linear.spans {

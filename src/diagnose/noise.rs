@@ -3,6 +3,8 @@
 //! Noise is judged by how much neighbouring readings differ, which a misfit that runs smoothly along the path does not touch;
 //! `docs/diagnosis.md` (60), (61).
 
+use std::collections::HashMap;
+
 use crate::identify::{Linear, Span};
 
 /// Noise of one kind of reading: first-order autoregressive.
@@ -150,6 +152,50 @@ pub(super) fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smo
     let rho = if rho < 0.03 { 0.0 } else { rho };
     let sigma2 = if rho == 0.0 { one } else { one / (1.0 - rho) };
     Noise { sigma: sigma2.min(1.05 * total).sqrt().max(FINEST), rho }
+}
+
+/// So many differences within groups of repeated approaches say what the noise is.
+const REPEATS: usize = 8;
+/// Positions that differ by less than this part of the travel are one.
+const SAME_PLACE: f64 = 1e-4;
+
+/// Noise of positions that were approached again and again from the same side: what their readings scatter, whatever the misfit.
+/// `None` where too few were.
+pub(super) fn repeated(
+    linear: &Linear,
+    residual: &[f64],
+    runs: &[&Vec<usize>],
+    out: &[bool],
+) -> Option<Noise> {
+    let extents: Vec<f64> = (0..linear.samples.first()?.joints.len())
+        .map(|j| {
+            let all = linear.samples.iter().flat_map(|s| s.joints[j].iter().flat_map(|c| &c.position));
+            let (low, high) =
+                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+            (high - low).max(FINEST)
+        })
+        .collect();
+    let mut groups: HashMap<Vec<i64>, Vec<f64>> = HashMap::new();
+    for row in runs.iter().flat_map(|run| run.iter()).filter(|row| !out[**row]) {
+        let sample = linear.sample[*row];
+        let s = linear.spans.iter().position(|s| (s.samples.0..s.samples.1).contains(&sample))?;
+        let k = sample - linear.spans[s].samples.0;
+        let mut place = vec![s as i64, linear.reading[*row] as i64];
+        for (joint, extent) in linear.samples[s].joints.iter().zip(&extents) {
+            let Some(joint) = joint else { continue };
+            place.push((joint.position[k] / (SAME_PLACE * extent)).round() as i64);
+            place.push(joint.direction[k] as i64);
+        }
+        groups.entry(place).or_default().push(residual[*row]);
+    }
+    let (mut squares, mut differences) = (0.0, 0);
+    for group in groups.values() {
+        let mean = group.iter().sum::<f64>() / group.len() as f64;
+        squares += group.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
+        differences += group.len() - 1;
+    }
+    (differences >= REPEATS)
+        .then(|| Noise { sigma: (squares / differences as f64).sqrt().max(FINEST), rho: 0.0 })
 }
 
 impl Whitener {

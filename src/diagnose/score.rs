@@ -6,10 +6,11 @@ use std::sync::{Arc, Mutex};
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
 use super::coarse::{Coarse, Features};
-use super::evidence::{evidence, log_mean_exp};
+use super::evidence::{Worth, evidence, log_mean_exp};
 use super::noise::Whitener;
 use super::space::Space;
-use crate::effects::{Candidate, Slot};
+use crate::effects::{Candidate, Coefficient, Slot};
+use crate::feature::Dimension;
 use crate::identify::Linear;
 use crate::lie::Twist;
 
@@ -49,7 +50,14 @@ pub(super) struct Score {
     pub coefficients: usize,
     /// Half the misfit energy that it takes away there.
     pub gain: f64,
+    /// Its coefficients may be this many usual sizes large once it is taken in.
+    pub room: f64,
 }
+
+/// Coefficients of effects that are taken in may be this many times the usual size, and this many times the likeliest if that is
+/// larger.
+const ROOM: f64 = 4.0;
+const ROOM_BEYOND: f64 = 2.0;
 
 /// Columns that are built at a time.
 const BATCH: usize = 48;
@@ -180,7 +188,12 @@ impl<'a> Rows<'a> {
             // Far from a line there is next to nothing: evidence of no gain.
             let none = -(candidate.coefficients.len() as f64);
             table.iter_mut().zip(&gains).for_each(|(best, gain)| {
-                *best = Some(Best { evidence: 0.5 * gain / heat + none, length: lengths[0], gain: *gain });
+                *best = Some(Best {
+                    evidence: 0.5 * gain / heat + none,
+                    length: lengths[0],
+                    gain: *gain,
+                    room: ROOM,
+                });
             });
             let peaks = peaks(&gains);
             peaks.iter().for_each(|i| table[*i] = None);
@@ -249,12 +262,13 @@ impl<'a> Rows<'a> {
                 let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
                 let gram = columns.tr_mul(&columns) - own.tr_mul(&own);
                 let g = toward.rows(b * k, k).into_owned();
-                let all: Vec<(f64, f64)> =
+                let all: Vec<Worth> =
                     lengths.iter().map(|length| evidence(&gram, &g, *length, heat)).collect();
-                let values: Vec<f64> = all.iter().map(|(evidence, _)| *evidence).collect();
+                let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
                 let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
-                table[*i] =
-                    Some(Best { evidence: log_mean_exp(&values), length: lengths[best], gain: all[best].1 });
+                let Worth { gain, size, .. } = all[best];
+                let room = if size > 1.0 { ROOM_BEYOND * size } else { ROOM };
+                table[*i] = Some(Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room });
             }
         }
     }
@@ -262,8 +276,9 @@ impl<'a> Rows<'a> {
     /// Whitened columns over blocks.
     fn on_blocks(&self, candidate: &Candidate, features: &[&[f32]], mut to: DMatrixViewMut<f64>) {
         for (c, coefficient) in candidate.coefficients.iter().enumerate() {
-            let unit =
-                coefficient.parts.first().map_or(0.0, |part| unit(coefficient.size, features[part.feature]));
+            let is_number = is_of_number(coefficient);
+            let unit = (coefficient.parts.first())
+                .map_or(0.0, |part| unit(coefficient.size, features[part.feature], is_number));
             let mut column = to.column_mut(c);
             let column = column.as_mut_slice();
             for part in &coefficient.parts {
@@ -298,6 +313,7 @@ struct Best {
     evidence: f64,
     length: usize,
     gain: f64,
+    room: f64,
 }
 
 /// Grids larger than this are screened by a spectrum, where the features are sines.
@@ -318,6 +334,7 @@ fn summary(grid: &[Vec<f64>], table: &[Option<Best>], points: &[usize]) -> Optio
         parameters: grid[at].clone(),
         coefficients: best.length,
         gain: best.gain,
+        room: best.room,
     })
 }
 
@@ -342,14 +359,26 @@ fn key(slot: Slot, direction: Twist<f64>) -> Key {
 }
 
 /// The usual size over the root mean square of the first part's feature.
-fn unit_size(coefficient: &crate::effects::Coefficient, features: &[Vec<f64>]) -> f64 {
-    coefficient.parts.first().map_or(0.0, |part| unit(coefficient.size, &features[part.feature]))
+fn unit_size(coefficient: &Coefficient, features: &[Vec<f64>]) -> f64 {
+    let is_number = is_of_number(coefficient);
+    coefficient.parts.first().map_or(0.0, |part| unit(coefficient.size, &features[part.feature], is_number))
 }
 
-fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X]) -> f64 {
+/// 0 where the feature is next to nothing at every sample: nobody can see it there, and its coefficient could be anything.
+fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X], is_number: bool) -> f64 {
     let square = |x: &X| (*x).into() * (*x).into();
     let rms = (feature.iter().map(square).sum::<f64>() / feature.len().max(1) as f64).sqrt();
-    if rms > 0.0 { size / rms } else { 0.0 }
+    if rms > if is_number { FAINT } else { ROUNDING } { size / rms } else { 0.0 }
+}
+
+/// Root mean square below which a feature is next to nothing: of those that are numbers and have the size of one where they act, and
+/// in SI of all others.
+const FAINT: f64 = 1e-4;
+const ROUNDING: f64 = 1e-12;
+
+/// Whether what it multiplies is a number without a unit.
+fn is_of_number(coefficient: &Coefficient) -> bool {
+    [Dimension::LENGTH, Dimension::ANGLE].contains(&coefficient.dimension)
 }
 
 /// How many coefficients may take part: all, or those of the first features from `least` on.

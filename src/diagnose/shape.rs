@@ -44,6 +44,27 @@ pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DM
     if columns.is_empty() { DMatrix::zeros(n, 0) } else { DMatrix::from_columns(&columns) }
 }
 
+/// Whether one effect is a curve along the travel of a joint, and the other a bump of the same motion there.
+pub(super) fn is_of_curve(curve: &Candidate, other: &Candidate) -> bool {
+    let along_travel = |candidate: &Candidate| {
+        !candidate.features.is_empty()
+            && candidate.features.iter().all(|f| {
+                !(f.needs_history() || f.needs_rates() || f.needs_gravity() || f.needs_time())
+                    && f.channels().is_empty()
+                    && f.wave().is_none()
+                    && f.joints().len() == 1
+            })
+    };
+    let motions = |candidate: &Candidate| -> Vec<(Slot, Twist<f64>)> {
+        candidate.coefficients.iter().flat_map(|c| &c.parts).map(|part| (part.slot, part.direction)).collect()
+    };
+    curve.place == other.place
+        && curve.parameters.is_empty()
+        && along_travel(curve)
+        && along_travel(other)
+        && motions(other).iter().all(|motion| motions(curve).contains(motion))
+}
+
 /// Answers of the readings to the directions of the effect, or to the mixture of them that was found.
 fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
     let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();
