@@ -37,7 +37,7 @@ use crate::recording::Recording;
 use coarse::Coarse;
 use noise::{Noise, Whitener};
 use score::Rows;
-use search::Search;
+use search::{Active, Search};
 
 /// What a diagnosis is asked.
 #[derive(Clone, Debug, Default)]
@@ -68,10 +68,14 @@ pub fn diagnose(
     let candidates = library.candidates(machine, &facts);
     let runs = noise::runs(&linear);
     let coarse = Coarse::new(&linear, candidates.all.len());
-    let out = noise::outliers(&linear.residual, &runs);
+    let out = noise::outliers(&linear.residual, &runs, facts_are_smooth(&facts));
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
 
+    let told = |search: &Search, active: &[Active]| match !facts_are_smooth(&facts) && !facts.approached {
+        true => folds::useful(search, active),
+        false => active.to_vec(),
+    };
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
     let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
     let mut active = Vec::new();
@@ -93,11 +97,12 @@ pub fn diagnose(
         if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
             let heat = search.leftover(&search.beside(&active, None)).heat;
             if heat < HOT {
+                let active = told(&search, &active);
                 return Ok(finding::report(&search, &active, machine, library, &noise));
             }
             // Much is left, as it always is on real machines: the simplest names that stand out from it count.
             let search = Search { heat, known: RefCell::default(), ..search };
-            active = search.run(&active);
+            active = told(&search, &search.run(&active));
             return Ok(finding::report(&search, &active, machine, library, &noise));
         }
         noise = judged;

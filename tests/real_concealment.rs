@@ -248,7 +248,7 @@ fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
     for number in 0..draws {
         // Every set meets every kind.
         let which = (number + number / SETS.len()) % SETS.len();
-        if !sets.contains_key(&which) {
+        if let std::collections::btree_map::Entry::Vacant(free) = sets.entry(which) {
             let (stem, folder, files) = SETS[which];
             let Some(set) = Set::read(stem, folder, files) else { return };
             let own = Own::of(&set);
@@ -259,7 +259,7 @@ fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
                 own.unexplained,
                 1e3 * own.held_out
             );
-            sets.insert(which, (set, own));
+            free.insert((set, own));
         }
         let (set, own) = &sets[&which];
         let ratio = 0.5 * 10f64.powf(random.unit());

@@ -40,6 +40,33 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
     }
 }
 
+/// What predicts stretches that were left out no worse: effects that make them worse go, the worst first. For few settled positions,
+/// of which nothing tells the noise but what is left of them.
+pub(super) fn useful(search: &Search, active: &[Active]) -> Vec<Active> {
+    let mut kept = active.to_vec();
+    while !kept.is_empty() {
+        let Some(folds) = Folds::new(search, &kept) else { return kept };
+        let constants = folds.raw.ncols() - kept.iter().map(|e| e.columns.ncols()).sum::<usize>();
+        let mut owner: Vec<Option<usize>> = vec![None; constants];
+        kept.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
+        let energy = |but: Option<usize>| {
+            let columns: Vec<usize> =
+                (0..owner.len()).filter(|c| owner[*c].is_none() || owner[*c] != but).collect();
+            let left = folds.left_out(search, &columns);
+            let mut white = vec![0.0; left.len()];
+            search.rows.whitener.apply(&left, &mut white);
+            white.iter().map(|x| x * x).sum::<f64>()
+        };
+        let all = energy(None);
+        let without = (0..kept.len()).map(|i| (i, energy(Some(i))));
+        match without.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((worst, energy)) if energy < all => drop(kept.remove(worst)),
+            _ => break,
+        }
+    }
+    kept
+}
+
 /// Normal equations of all samples and of each fold.
 struct Folds {
     /// Columns as they are, m and rad.

@@ -37,6 +37,8 @@ pub(super) struct Whitener {
 const NONE: u32 = u32::MAX;
 /// Beyond so many standard deviations of its surroundings a reading is an outlier.
 const OUTLIER: f64 = 5.0;
+/// So many readings on either side tell how rough it is around one.
+const AROUND: usize = 15;
 /// No instrument resolves less, m or rad.
 const FINEST: f64 = 1e-10;
 /// Two estimates of the memory that differ by less tell of the same noise.
@@ -71,7 +73,8 @@ fn is_pause(span: &Span, last: Option<f64>, now: Option<f64>) -> bool {
 }
 
 /// Rows that lie far off their neighbours: by the median of the two on either side.
-pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
+/// `smooth`: along a continuous path one scale holds for all; settled positions are compared with those around them.
+pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> Vec<bool> {
     let mut out = vec![false; residual.len()];
     for run in runs.iter().filter(|run| run.len() > 20) {
         let mut off: Vec<(usize, f64)> = Vec::with_capacity(run.len());
@@ -85,7 +88,18 @@ pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
         let mut sizes: Vec<f64> = off.iter().map(|(_, d)| d.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let scale = (1.4826 * sizes[sizes.len() / 2]).max(FINEST);
-        off.iter().for_each(|(row, d)| out[*row] = d.abs() > OUTLIER * scale);
+        for (i, (row, d)) in off.iter().enumerate().filter(|(_, (_, d))| d.abs() > OUTLIER * scale) {
+            if smooth {
+                out[*row] = true;
+                continue;
+            }
+            // Where it is rough all around, that is how it is there.
+            let from = i.saturating_sub(AROUND).min(off.len().saturating_sub(2 * AROUND + 1));
+            let around = &off[from..(from + 2 * AROUND + 1).min(off.len())];
+            let mut near: Vec<f64> = around.iter().map(|(_, d)| d.abs()).collect();
+            near.sort_by(f64::total_cmp);
+            out[*row] = d.abs() > OUTLIER * 1.4826 * near[near.len() / 2];
+        }
         // A reading next to which the path itself jumps is none.
         let flagged = run.iter().filter(|row| out[**row]).count();
         if flagged > run.len() / 10 {

@@ -31,18 +31,26 @@ pub struct WithoutOutliers {
     pub r#final: f64,
 }
 
-/// A reading that was left out counts as an outlier beyond so many standard deviations of the noise.
+/// A reading that was left out counts as an outlier beyond so many standard deviations of the noise, and of what is left of others.
 const FAR: f64 = 6.0;
 
 /// Puts them into the diagnosis. `geometric`, `left`: residuals with constant deviations and with everything found, m and rad.
 pub(super) fn fill(search: &Search, geometric: &[f64], left: &[f64], diagnosis: &mut Diagnosis) {
     let linear = search.rows.linear;
-    let noise = |row: usize| match linear.angle[row] {
-        true => diagnosis.noise_floor_rad,
-        false => diagnosis.noise_floor_m,
+    let others = |angle: bool| {
+        let rows =
+            (0..left.len()).filter(|row| linear.angle[*row] == angle && !search.rows.whitener.out[*row]);
+        let squares: Vec<f64> = rows.map(|row| left[row] * left[row]).collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    };
+    let (length, angle) = (others(false), others(true));
+    let (noise_m, noise_rad) = (diagnosis.noise_floor_m, diagnosis.noise_floor_rad);
+    let scatter = |row: usize| match linear.angle[row] {
+        true => noise_rad.map(|sigma| sigma.max(angle)),
+        false => noise_m.map(|sigma| sigma.max(length)),
     };
     let is_far = |row: &usize| {
-        search.rows.whitener.out[*row] && noise(*row).is_some_and(|sigma| left[*row].abs() > FAR * sigma)
+        search.rows.whitener.out[*row] && scatter(*row).is_some_and(|sigma| left[*row].abs() > FAR * sigma)
     };
     let mut all = Vec::new();
     let mut without: Vec<usize> = Vec::new();
