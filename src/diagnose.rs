@@ -12,6 +12,7 @@ mod held_out;
 mod leftover;
 mod model;
 mod noise;
+mod outliers;
 mod score;
 mod search;
 mod shape;
@@ -23,6 +24,7 @@ mod waves;
 pub use finding::{
     Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size, Unexplained, Where,
 };
+pub use outliers::{Outliers, WithoutOutliers};
 pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
 
 use std::cell::RefCell;
@@ -35,7 +37,7 @@ use crate::recording::Recording;
 use coarse::Coarse;
 use noise::{Noise, Whitener};
 use score::Rows;
-use search::Search;
+use search::{Active, Search};
 
 /// What a diagnosis is asked.
 #[derive(Clone, Debug, Default)]
@@ -46,6 +48,8 @@ pub struct Request {
 
 /// Rounds of judging the noise from what is left.
 const NOISE_ROUNDS: usize = 3;
+/// Where chance is that much larger than the noise, the effects are chosen once more against it.
+const HOT: f64 = 3.0;
 
 /// Diagnoses what constant geometry leaves over in these recordings.
 ///
@@ -64,10 +68,14 @@ pub fn diagnose(
     let candidates = library.candidates(machine, &facts);
     let runs = noise::runs(&linear);
     let coarse = Coarse::new(&linear, candidates.all.len());
-    let out = noise::outliers(&linear.residual, &runs);
+    let out = noise::outliers(&linear.residual, &runs, facts_are_smooth(&facts));
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
 
+    let told = |search: &Search, active: &[Active]| match !facts_are_smooth(&facts) && !facts.approached {
+        true => folds::useful(search, active),
+        false => active.to_vec(),
+    };
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
     let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
     let mut active = Vec::new();
@@ -81,11 +89,20 @@ pub fn diagnose(
             candidates: &candidates.all,
             priors: priors.clone(),
             progress,
+            heat: 1.0,
             known: RefCell::default(),
         };
         active = search.run(&active);
         let judged = noise_of(&linear, &finding::residual_of(&search, &active), &runs, &out, &facts);
         if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
+            let heat = search.leftover(&search.beside(&active, None)).heat;
+            if heat < HOT {
+                let active = told(&search, &active);
+                return Ok(finding::report(&search, &active, machine, library, &noise));
+            }
+            // Much is left, as it always is on real machines: the simplest names that stand out from it count.
+            let search = Search { heat, known: RefCell::default(), ..search };
+            active = told(&search, &search.run(&active));
             return Ok(finding::report(&search, &active, machine, library, &noise));
         }
         noise = judged;
@@ -109,6 +126,11 @@ fn noise_of(
     let estimate = |angle: bool| {
         let own: Vec<&Vec<usize>> =
             runs.iter().filter(|run| run.first().is_some_and(|r| linear.angle[*r] == angle)).collect();
+        if facts.approached
+            && let Some(noise) = noise::repeated(linear, left, &own, out)
+        {
+            return noise;
+        }
         noise::estimate(left, &own, out, smooth)
     };
     let (length, angle) = (estimate(false), estimate(true));

@@ -101,11 +101,11 @@ impl Concealed {
                     let step = |k: usize| if k == *from { 0.0 } else { q[k] - q[k - 1] };
                     let first = (*from..to).map(step).find(|s| s.abs() > 1e-4).unwrap_or(1.0);
                     let mut last = first.signum();
-                    for k in *from..to {
+                    for (k, side) in side.iter_mut().enumerate().take(to).skip(*from) {
                         if step(k).abs() > 1e-4 {
                             last = step(k).signum();
                         }
-                        side[k] = -0.5 * last;
+                        *side = -0.5 * last;
                     }
                 }
                 side
@@ -248,7 +248,7 @@ fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
     for number in 0..draws {
         // Every set meets every kind.
         let which = (number + number / SETS.len()) % SETS.len();
-        if !sets.contains_key(&which) {
+        if let std::collections::btree_map::Entry::Vacant(free) = sets.entry(which) {
             let (stem, folder, files) = SETS[which];
             let Some(set) = Set::read(stem, folder, files) else { return };
             let own = Own::of(&set);
@@ -259,7 +259,7 @@ fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
                 own.unexplained,
                 1e3 * own.held_out
             );
-            sets.insert(which, (set, own));
+            free.insert((set, own));
         }
         let (set, own) = &sets[&which];
         let ratio = 0.5 * 10f64.powf(random.unit());

@@ -4,24 +4,66 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Usual sizes are known to within a factor of so many, either way.
 const SIZES: [f64; 3] = [0.25, 1.0, 4.0];
+/// Where coefficients are larger than that, sizes four times larger each are asked too, so often at most, and each is less likely
+/// beforehand by this (logarithm): a wrong electrical signal exceeds what is usual on sound machines thousands of times.
+const STEP: f64 = 4.0;
+const MORE: usize = 9;
+const RARER: f64 = 2.0;
 
-/// Logarithm of the evidence of the first `length` columns, whose coefficients are normal with the sizes usual on machines, and half
-/// the energy that they take away.
-pub(super) fn evidence(gram: &DMatrix<f64>, g: &DVector<f64>, length: usize, heat: f64) -> (f64, f64) {
-    let (gram, g) = (gram.view((0, 0), (length, length)), g.rows(0, length));
-    let mut gain = 0.0;
-    let logs = SIZES.map(|size| {
+/// What columns are worth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Worth {
+    /// Logarithm of their evidence.
+    pub evidence: f64,
+    /// Half the energy that they take away.
+    pub gain: f64,
+    /// The size of coefficients, over the usual one, that is likeliest among those beyond the usual; 1 where the usual will do.
+    pub size: f64,
+}
+
+/// Evidence of the first `length` columns, whose coefficients are normal with the sizes usual on machines, or larger where the
+/// recordings ask for that.
+pub(super) fn evidence(gram: &DMatrix<f64>, g: &DVector<f64>, length: usize, heat: f64) -> Worth {
+    let (gram, g) = (gram.view((0, 0), (length, length)), g.rows(0, length).into_owned());
+    // Logarithm, gain, root mean square of the coefficients over the size.
+    let with = |size: f64| {
         let s2 = size * size / heat;
         let mut inner = gram * s2;
         (0..length).for_each(|i| inner[(i, i)] += 1.0);
-        let Some(cholesky) = Cholesky::new(inner) else { return f64::NEG_INFINITY };
-        let solved = cholesky.solve(&g.into_owned()) * s2;
-        let explained = 0.5 * g.dot(&solved) / heat;
-        gain = f64::max(gain, explained * heat);
+        let cholesky = Cholesky::new(inner)?;
+        let solved = cholesky.solve(&g) * s2;
+        let gain = 0.5 * g.dot(&solved);
         let log_det: f64 = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        explained - log_det
+        Some((gain / heat - log_det, gain, solved.norm() / (length as f64).sqrt() / size))
+    };
+    let mut worth = Worth { evidence: 0.0, gain: 0.0, size: 1.0 };
+    let mut held = false;
+    let logs = SIZES.map(|size| {
+        let Some((log, gain, large)) = with(size) else { return f64::NEG_INFINITY };
+        worth.gain = worth.gain.max(gain);
+        held = large > 1.0;
+        log
     });
-    (log_mean_exp(&logs), gain)
+    worth.evidence = log_mean_exp(&logs);
+    let (mut size, mut best) = (SIZES[SIZES.len() - 1], logs.iter().copied().fold(f64::MIN, f64::max));
+    let mut beyond = Vec::new();
+    while held && beyond.len() < MORE {
+        size *= STEP;
+        let Some((log, gain, large)) = with(size) else { break };
+        let log = log - RARER * (beyond.len() + 1) as f64;
+        worth.gain = worth.gain.max(gain);
+        held = large > 1.0;
+        if log > best {
+            (best, worth.size) = (log, size);
+        }
+        beyond.push(log - (SIZES.len() as f64).ln());
+    }
+    if !beyond.is_empty() {
+        let most = beyond.iter().copied().fold(worth.evidence, f64::max);
+        let sum: f64 = beyond.iter().chain([&worth.evidence]).map(|l| (l - most).exp()).sum();
+        worth.evidence = most + sum.ln();
+    }
+    worth
 }
 
 /// `ln` of the mean of exponentials.

@@ -6,9 +6,11 @@ use serde::Serialize;
 use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
-use super::search::{Active, ROOM, Rival, Search};
+use super::outliers::{self, Outliers, WithoutOutliers};
+use super::search::{Active, Rival, Search};
 use super::traces::{self, Traces};
-use crate::effects::{Identified, Library, StoredEffect};
+use crate::effects::{Identified, Library, StoredEffect, in_words};
+use crate::feature::Dimension;
 use crate::identify::BeforeAfter;
 use crate::location::LocationErrors;
 use crate::machine::Machine;
@@ -47,6 +49,15 @@ pub struct Diagnosis {
     /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
+    /// Samples that were left out because they lie far off.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<Outliers>,
+    /// RMS of lengths without them, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_without_outliers_m: Option<WithoutOutliers>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_without_outliers_rad: Option<WithoutOutliers>,
     /// What its pictures show.
     #[serde(skip)]
     pub traces: Traces,
@@ -251,7 +262,9 @@ pub(super) fn report(
         let explanation = identified.sentence(machine, &sizes);
         named.push(Named {
             effect: identified.stored(machine, &sizes),
-            scales: search.rows.units(candidate, &effect.score.parameters).iter().map(|u| ROOM * u).collect(),
+            scales: (search.rows.units(candidate, &effect.score.parameters).iter())
+                .map(|u| effect.score.room * u)
+                .collect(),
         });
         let confusable_with = rivals
             .iter()
@@ -289,13 +302,16 @@ pub(super) fn report(
         let sigma = noise_of(false).or(noise_of(true)).unwrap_or(1.0);
         let rms_m =
             sigma * (geometric.energy.max(left.energy) / search.rows.whitener.count().max(1) as f64).sqrt();
+        let size = match noise_of(false) {
+            Some(_) => format!("{:.2} um", 1e6 * rms_m),
+            None => in_words(rms_m, None, Dimension::ANGLE, None),
+        };
         Unexplained {
             rms_m,
             at: at.clone(),
             r#where: Vec::new(),
             explanation: format!(
-                "structure of {:.2} um is left that no named effect explains; it fits best at {at}",
-                1e6 * rms_m
+                "structure of {size} is left that no named effect explains; it fits best at {at}"
             ),
         }
     });
@@ -315,9 +331,14 @@ pub(super) fn report(
         findings,
         unexplained,
         named,
+        outliers: Vec::new(),
+        rms_without_outliers_m: None,
+        rms_without_outliers_rad: None,
         traces: Traces::default(),
         location_errors: linear.fit.location_errors.clone(),
     };
+    let geometric = Model::new(search, &[]).residual(search, &[]);
+    outliers::fill(search, &geometric, &left_over, &mut diagnosis);
     folds::fill(search, &told, &mut diagnosis);
     traces::fill(search, &told, &left_over, machine, &mut diagnosis);
     diagnosis

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::finding::{Diagnosis, HeldOutPair, HeldOutRms, rms_of};
-use super::search::{Active, ROOM, Search};
+use super::search::{Active, Search};
 
 /// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
 const FOLDS: usize = 5;
@@ -106,6 +106,33 @@ fn grams(
     (0..FOLDS).map(one).collect()
 }
 
+/// What predicts stretches that were left out no worse: effects that make them worse go, the worst first. For few settled positions,
+/// of which nothing tells the noise but what is left of them.
+pub(super) fn useful(search: &Search, active: &[Active]) -> Vec<Active> {
+    let mut kept = active.to_vec();
+    while !kept.is_empty() {
+        let Some(folds) = Folds::new(search, &kept) else { return kept };
+        let constants = folds.raw.ncols() - kept.iter().map(|e| e.columns.ncols()).sum::<usize>();
+        let mut owner: Vec<Option<usize>> = vec![None; constants];
+        kept.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
+        let energy = |but: Option<usize>| {
+            let columns: Vec<usize> =
+                (0..owner.len()).filter(|c| owner[*c].is_none() || owner[*c] != but).collect();
+            let left = folds.left_out(search, &columns);
+            let mut white = vec![0.0; left.len()];
+            search.rows.whitener.apply(&left, &mut white);
+            white.iter().map(|x| x * x).sum::<f64>()
+        };
+        let all = energy(None);
+        let without = (0..kept.len()).map(|i| (i, energy(Some(i))));
+        match without.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((worst, energy)) if energy < all => drop(kept.remove(worst)),
+            _ => break,
+        }
+    }
+    kept
+}
+
 /// Normal equations of all samples and of each fold.
 struct Folds {
     /// Columns as they are, m and rad.
@@ -126,7 +153,7 @@ impl Folds {
             let own = rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)?;
             let (at, count) = (raw.ncols(), effect.columns.ncols());
             raw = raw.insert_columns(at, count, 0.0);
-            raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * ROOM));
+            raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * effect.score.room));
         }
         let owner = owners(search)?;
         let mut white = raw.clone();

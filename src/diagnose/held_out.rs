@@ -51,7 +51,7 @@ impl Model {
             {
                 let count = effect.columns.ncols();
                 left -=
-                    raw.columns(0, count) * super::search::ROOM * self.solution.rows(self.offsets[i], count);
+                    raw.columns(0, count) * effect.score.room * self.solution.rows(self.offsets[i], count);
             }
         }
         left.as_slice().to_vec()
@@ -64,7 +64,7 @@ impl Model {
         let units = search.rows.units(candidate, &effect.score.parameters);
         let (k, all, parameters) =
             (effect.columns.ncols(), candidate.coefficients.len(), effect.score.parameters.len());
-        let scale = |c: usize| super::search::ROOM * units[c];
+        let scale = |c: usize| effect.score.room * units[c];
         let mut coefficients = vec![0.0; all];
         (0..k).for_each(|c| coefficients[c] = scale(c) * self.solution[self.offsets[i] + c]);
         // Derivatives by the parameters join the columns.

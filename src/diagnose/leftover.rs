@@ -8,6 +8,8 @@ use std::f64::consts::TAU;
 
 /// Lengths of blocks, readings.
 const LENGTHS: [usize; 5] = [4, 8, 16, 32, 64];
+/// Longer ones, for the heat alone.
+const LONG: [usize; 2] = [128, 256];
 /// Readings of a stretch, and bands into which its spectrum is divided.
 const STRETCH: usize = 64;
 const BANDS: usize = 8;
@@ -51,6 +53,18 @@ pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Le
             (worst.beyond, worst.energy) = (beyond, excess);
         }
         worst.heat = worst.heat.max(1.0 + excess / count as f64);
+    }
+    for length in LONG {
+        let sums =
+            kept.iter().flat_map(|run| run.chunks_exact(length)).map(|block| block.iter().sum::<f64>());
+        let squares: Vec<f64> = sums.map(|sum| sum * sum / length as f64).collect();
+        if squares.len() < 8 {
+            continue;
+        }
+        let count = squares.len() as f64;
+        // Few blocks: what chance alone may add is left out.
+        let heat = squares.iter().sum::<f64>() / count / (1.0 + 2.0 * (2.0 / count).sqrt());
+        worst.heat = worst.heat.max(heat);
     }
     let Some((energy, beyond, band)) = loud(&kept) else { return worst };
     worst.band = band;

@@ -3,6 +3,8 @@
 //! Noise is judged by how much neighbouring readings differ, which a misfit that runs smoothly along the path does not touch;
 //! `docs/diagnosis.md` (60), (61).
 
+use std::collections::HashMap;
+
 use crate::identify::{Linear, Span};
 
 /// Noise of one kind of reading: first-order autoregressive.
@@ -35,6 +37,8 @@ pub(super) struct Whitener {
 const NONE: u32 = u32::MAX;
 /// Beyond so many standard deviations of its surroundings a reading is an outlier.
 const OUTLIER: f64 = 5.0;
+/// So many readings on either side tell how rough it is around one.
+const AROUND: usize = 15;
 /// No instrument resolves less, m or rad.
 const FINEST: f64 = 1e-10;
 /// Two estimates of the memory that differ by less tell of the same noise.
@@ -69,7 +73,8 @@ fn is_pause(span: &Span, last: Option<f64>, now: Option<f64>) -> bool {
 }
 
 /// Rows that lie far off their neighbours: by the median of the two on either side.
-pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
+/// `smooth`: along a continuous path one scale holds for all; settled positions are compared with those around them.
+pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> Vec<bool> {
     let mut out = vec![false; residual.len()];
     for run in runs.iter().filter(|run| run.len() > 20) {
         let mut off: Vec<(usize, f64)> = Vec::with_capacity(run.len());
@@ -83,7 +88,18 @@ pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
         let mut sizes: Vec<f64> = off.iter().map(|(_, d)| d.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let scale = (1.4826 * sizes[sizes.len() / 2]).max(FINEST);
-        off.iter().for_each(|(row, d)| out[*row] = d.abs() > OUTLIER * scale);
+        for (i, (row, d)) in off.iter().enumerate().filter(|(_, (_, d))| d.abs() > OUTLIER * scale) {
+            if smooth {
+                out[*row] = true;
+                continue;
+            }
+            // Where it is rough all around, that is how it is there.
+            let from = i.saturating_sub(AROUND).min(off.len().saturating_sub(2 * AROUND + 1));
+            let around = &off[from..(from + 2 * AROUND + 1).min(off.len())];
+            let mut near: Vec<f64> = around.iter().map(|(_, d)| d.abs()).collect();
+            near.sort_by(f64::total_cmp);
+            out[*row] = d.abs() > OUTLIER * 1.4826 * near[near.len() / 2];
+        }
         // A reading next to which the path itself jumps is none.
         let flagged = run.iter().filter(|row| out[**row]).count();
         if flagged > run.len() / 10 {
@@ -150,6 +166,50 @@ pub(super) fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smo
     let rho = if rho < 0.03 { 0.0 } else { rho };
     let sigma2 = if rho == 0.0 { one } else { one / (1.0 - rho) };
     Noise { sigma: sigma2.min(1.05 * total).sqrt().max(FINEST), rho }
+}
+
+/// So many differences within groups of repeated approaches say what the noise is.
+const REPEATS: usize = 8;
+/// Positions that differ by less than this part of the travel are one.
+const SAME_PLACE: f64 = 1e-4;
+
+/// Noise of positions that were approached again and again from the same side: what their readings scatter, whatever the misfit.
+/// `None` where too few were.
+pub(super) fn repeated(
+    linear: &Linear,
+    residual: &[f64],
+    runs: &[&Vec<usize>],
+    out: &[bool],
+) -> Option<Noise> {
+    let extents: Vec<f64> = (0..linear.samples.first()?.joints.len())
+        .map(|j| {
+            let all = linear.samples.iter().flat_map(|s| s.joints[j].iter().flat_map(|c| &c.position));
+            let (low, high) =
+                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+            (high - low).max(FINEST)
+        })
+        .collect();
+    let mut groups: HashMap<Vec<i64>, Vec<f64>> = HashMap::new();
+    for row in runs.iter().flat_map(|run| run.iter()).filter(|row| !out[**row]) {
+        let sample = linear.sample[*row];
+        let s = linear.spans.iter().position(|s| (s.samples.0..s.samples.1).contains(&sample))?;
+        let k = sample - linear.spans[s].samples.0;
+        let mut place = vec![s as i64, linear.reading[*row] as i64];
+        for (joint, extent) in linear.samples[s].joints.iter().zip(&extents) {
+            let Some(joint) = joint else { continue };
+            place.push((joint.position[k] / (SAME_PLACE * extent)).round() as i64);
+            place.push(joint.direction[k] as i64);
+        }
+        groups.entry(place).or_default().push(residual[*row]);
+    }
+    let (mut squares, mut differences) = (0.0, 0);
+    for group in groups.values() {
+        let mean = group.iter().sum::<f64>() / group.len() as f64;
+        squares += group.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
+        differences += group.len() - 1;
+    }
+    (differences >= REPEATS)
+        .then(|| Noise { sigma: (squares / differences as f64).sqrt().max(FINEST), rho: 0.0 })
 }
 
 impl Whitener {

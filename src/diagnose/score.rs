@@ -6,10 +6,11 @@ use std::sync::{Arc, Mutex};
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
 use super::coarse::{Coarse, Features};
-use super::evidence::{evidence, log_mean_exp};
+use super::evidence::{Worth, evidence, log_mean_exp};
 use super::noise::Whitener;
 use super::space::Space;
-use crate::effects::{Candidate, Slot};
+use crate::effects::{Candidate, Coefficient, Slot};
+use crate::feature::Dimension;
 use crate::identify::Linear;
 use crate::lie::Twist;
 
@@ -27,7 +28,7 @@ pub(super) struct Rows<'a> {
 
 /// What all candidates are judged against: the space, and the residuals beside it, fine and coarse.
 pub(super) struct Field {
-    space: Space,
+    pub space: Space,
     /// `M r`.
     pub left: DVector<f64>,
     coarse_space: Space,
@@ -49,7 +50,14 @@ pub(super) struct Score {
     pub coefficients: usize,
     /// Half the misfit energy that it takes away there.
     pub gain: f64,
+    /// Its coefficients may be this many usual sizes large once it is taken in.
+    pub room: f64,
 }
+
+/// Coefficients of effects that are taken in may be this many times the usual size, and this many times the likeliest if that is
+/// larger.
+const ROOM: f64 = 4.0;
+const ROOM_BEYOND: f64 = 2.0;
 
 /// Columns that are built at a time.
 const BATCH: usize = 48;
@@ -187,7 +195,7 @@ impl<'a> Rows<'a> {
             let part = (exact.fold(0.0, f64::max) / rough.max(1e-300)).min(1.0);
             for (best, gain) in table.iter_mut().zip(&gains).filter(|(best, _)| best.is_none()) {
                 let gain = 0.5 * part * gain;
-                *best = Some(Best { evidence: gain / heat + none, length: lengths[0], gain });
+                *best = Some(Best { evidence: gain / heat + none, length: lengths[0], gain, room: ROOM });
             }
             return summary(&candidate.grid, &table, &peaks);
         }
@@ -253,12 +261,13 @@ impl<'a> Rows<'a> {
                 let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
                 let gram = columns.tr_mul(&columns) - own.tr_mul(&own);
                 let g = toward.rows(b * k, k).into_owned();
-                let all: Vec<(f64, f64)> =
+                let all: Vec<Worth> =
                     lengths.iter().map(|length| evidence(&gram, &g, *length, heat)).collect();
-                let values: Vec<f64> = all.iter().map(|(evidence, _)| *evidence).collect();
+                let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
                 let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
-                table[*i] =
-                    Some(Best { evidence: log_mean_exp(&values), length: lengths[best], gain: all[best].1 });
+                let Worth { gain, size, .. } = all[best];
+                let room = if size > 1.0 { ROOM_BEYOND * size } else { ROOM };
+                table[*i] = Some(Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room });
             }
         }
     }
@@ -266,8 +275,9 @@ impl<'a> Rows<'a> {
     /// Whitened columns over blocks.
     fn on_blocks(&self, candidate: &Candidate, features: &[&[f32]], mut to: DMatrixViewMut<f64>) {
         for (c, coefficient) in candidate.coefficients.iter().enumerate() {
-            let unit =
-                coefficient.parts.first().map_or(0.0, |part| unit(coefficient.size, features[part.feature]));
+            let is_number = is_of_number(coefficient);
+            let unit = (coefficient.parts.first())
+                .map_or(0.0, |part| unit(coefficient.size, features[part.feature], is_number));
             let mut column = to.column_mut(c);
             let column = column.as_mut_slice();
             for part in &coefficient.parts {
@@ -302,6 +312,7 @@ struct Best {
     evidence: f64,
     length: usize,
     gain: f64,
+    room: f64,
 }
 
 /// Grids larger than this are screened by a spectrum, where the features are sines.
@@ -322,6 +333,7 @@ fn summary(grid: &[Vec<f64>], table: &[Option<Best>], points: &[usize]) -> Optio
         parameters: grid[at].clone(),
         coefficients: best.length,
         gain: best.gain,
+        room: best.room,
     })
 }
 
@@ -346,14 +358,26 @@ fn key(slot: Slot, direction: Twist<f64>) -> Key {
 }
 
 /// The usual size over the root mean square of the first part's feature.
-fn unit_size(coefficient: &crate::effects::Coefficient, features: &[Vec<f64>]) -> f64 {
-    coefficient.parts.first().map_or(0.0, |part| unit(coefficient.size, &features[part.feature]))
+fn unit_size(coefficient: &Coefficient, features: &[Vec<f64>]) -> f64 {
+    let is_number = is_of_number(coefficient);
+    coefficient.parts.first().map_or(0.0, |part| unit(coefficient.size, &features[part.feature], is_number))
 }
 
-fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X]) -> f64 {
+/// 0 where the feature is next to nothing at every sample: nobody can see it there, and its coefficient could be anything.
+fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X], is_number: bool) -> f64 {
     let square = |x: &X| (*x).into() * (*x).into();
     let rms = (feature.iter().map(square).sum::<f64>() / feature.len().max(1) as f64).sqrt();
-    if rms > 0.0 { size / rms } else { 0.0 }
+    if rms > if is_number { FAINT } else { ROUNDING } { size / rms } else { 0.0 }
+}
+
+/// Root mean square below which a feature is next to nothing: of those that are numbers and have the size of one where they act, and
+/// in SI of all others.
+const FAINT: f64 = 1e-4;
+const ROUNDING: f64 = 1e-12;
+
+/// Whether what it multiplies is a number without a unit.
+fn is_of_number(coefficient: &Coefficient) -> bool {
+    [Dimension::LENGTH, Dimension::ANGLE].contains(&coefficient.dimension)
 }
 
 /// How many coefficients may take part: all, or those of the first features from `least` on.

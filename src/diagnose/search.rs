@@ -53,6 +53,8 @@ pub(super) struct Search<'a> {
     /// Logarithm of what is expected of each candidate beforehand.
     pub priors: Vec<f64>,
     pub progress: &'a dyn Fn(&str),
+    /// By how much chance counts as larger than the noise says.
+    pub heat: f64,
     /// Rivals that are known, by what has been taken in besides.
     pub known: RefCell<Known>,
 }
@@ -65,8 +67,6 @@ pub(super) type Mark = (usize, usize, Vec<u64>);
 
 /// So many candidates that came next to an effect are compared with it again and again.
 const NEAR: usize = 40;
-/// While it is searched, chance counts as large as the noise says.
-const HEAT: f64 = 1.0;
 /// Candidates with this part of the best one's weight come into question, and at most so many.
 const CLOSE: f64 = 0.6;
 const REFINED: usize = 8;
@@ -74,8 +74,6 @@ const REFINED: usize = 8;
 const ROUNDS: usize = 2;
 const PARABOLAS: usize = 3;
 const HALVINGS: usize = 9;
-/// Coefficients of effects that are taken in may be this many times the usual size.
-pub(super) const ROOM: f64 = 4.0;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
@@ -118,11 +116,11 @@ impl Search<'_> {
     fn compare(&self, space: &Space, among: Option<&[usize]>) -> Vec<Rival> {
         let field = self.rows.field(space.clone());
         // What progress is told is no matter of the threads.
-        let (rows, priors, candidates) = (self.rows, &self.priors, self.candidates);
+        let (rows, priors, candidates, heat) = (self.rows, &self.priors, self.candidates, self.heat);
         let all: Vec<usize> = among.map_or_else(|| (0..candidates.len()).collect(), <[usize]>::to_vec);
         let mut rivals: Vec<Rival> = (all.into_par_iter())
             .filter_map(|i| {
-                let score = rows.screen(i, &candidates[i], &field, HEAT)?;
+                let score = rows.screen(i, &candidates[i], &field, heat)?;
                 Some(Rival { candidate: i, weight: score.evidence + priors[i], score })
             })
             .collect();
@@ -133,15 +131,16 @@ impl Search<'_> {
         let close = rivals.iter().take_while(|r| r.weight >= near && r.weight > 0.0).count().min(REFINED);
         let refined: Vec<Rival> = rivals[..close]
             .par_iter()
-            .map(|r| refine(rows, &candidates[r.candidate], r, &field, HEAT))
+            .map(|r| refine(rows, &candidates[r.candidate], r, &field, heat))
             .collect();
         rivals.splice(..close, refined);
         rivals.sort_by(better_first);
         rivals
     }
 
-    /// A rival where chance is larger than the noise says.
+    /// A rival where chance is larger than what it was searched with.
     pub fn tempered(&self, rival: &Rival, heat: f64) -> Rival {
+        let heat = (heat / self.heat).max(1.0);
         let prior = self.priors[rival.candidate];
         Rival { weight: prior + (rival.weight - prior) / heat, ..rival.clone() }
     }
@@ -168,7 +167,7 @@ impl Search<'_> {
         let score = rival.score.clone();
         let candidate = &self.candidates[rival.candidate];
         let columns = self.rows.of(candidate, &score.parameters)?;
-        let columns = columns.columns(0, score.coefficients) * ROOM;
+        let columns = columns.columns(0, score.coefficients) * score.room;
         let along = space.along(&columns.as_view());
         let gram = columns.tr_mul(&columns) - along.tr_mul(&along)
             + DMatrix::identity(score.coefficients, score.coefficients);
@@ -192,7 +191,7 @@ impl Search<'_> {
             let space = self.beside(&active, None);
             let (rows, candidate) = (self.rows, &self.candidates[effect.candidate]);
             let Some(score) =
-                rows.score_at(candidate, &effect.score.parameters, &rows.field(space.clone()), HEAT)
+                rows.score_at(candidate, &effect.score.parameters, &rows.field(space.clone()), self.heat)
             else {
                 continue;
             };
@@ -224,7 +223,7 @@ impl Search<'_> {
             let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
             active.push(Active { near, ..entered });
             let left = self.leftover(&self.beside(&active, None));
-            if best.weight < ENTER * left.heat {
+            if best.weight < ENTER * (left.heat / self.heat).max(1.0) {
                 active.pop();
                 break;
             }
@@ -240,12 +239,15 @@ impl Search<'_> {
         self.candidates[rival.candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
     }
 
-    /// Whether it has the name and place of what was found already and is little beside it: that is its shape.
+    /// Whether it is little beside what was found already at its place and has its name, or is another shape along the travel where
+    /// a curve was found: that is its shape.
     fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
         let of = |candidate: usize| (&self.candidates[candidate].effect, self.candidates[candidate].place);
-        active
-            .iter()
-            .any(|a| of(a.candidate) == of(rival.candidate) && rival.score.gain < REPEATED * a.score.gain)
+        let alike = |a: &Active| {
+            of(a.candidate) == of(rival.candidate)
+                || shape::is_of_curve(&self.candidates[a.candidate], &self.candidates[rival.candidate])
+        };
+        active.iter().any(|a| rival.score.gain < REPEATED * a.score.gain && alike(a))
     }
 
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place.

@@ -53,6 +53,29 @@ fn thinned(columns: DMatrix<f64>) -> DMatrix<f64> {
     columns * eigen.eigenvectors.select_columns(&kept)
 }
 
+/// Whether one effect is a curve along the travel of a joint, and the other a bump of the same motion there.
+pub(super) fn is_of_curve(curve: &Candidate, other: &Candidate) -> bool {
+    let motions = |candidate: &Candidate| -> Vec<(Slot, Twist<f64>)> {
+        candidate.coefficients.iter().flat_map(|c| &c.parts).map(|part| (part.slot, part.direction)).collect()
+    };
+    curve.place == other.place
+        && curve.parameters.is_empty()
+        && is_along_travel(curve)
+        && is_along_travel(other)
+        && motions(other).iter().all(|motion| motions(curve).contains(motion))
+}
+
+/// Whether it depends on where one joint stands and on nothing else, and is no wave.
+fn is_along_travel(candidate: &Candidate) -> bool {
+    !candidate.features.is_empty()
+        && candidate.features.iter().all(|f| {
+            !(f.needs_history() || f.needs_rates() || f.needs_gravity() || f.needs_time())
+                && f.channels().is_empty()
+                && f.wave().is_none()
+                && f.joints().len() == 1
+        })
+}
+
 /// Answers of the readings to the directions of the effect, or to the mixture of them that was found.
 fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
     let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();

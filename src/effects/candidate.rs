@@ -259,8 +259,12 @@ fn candidate(
     let there = |e: &Expression| {
         owners.iter().all(|own| !matches!(Feature::bind(e, &binding(*own)), Err(Unbound::NoLever)))
     };
+    // Through few targets goes every curve of as high an order.
+    let is_shown = |e: &Expression| {
+        own.and_then(|j| facts.places[j]).is_none_or(|places| usize::from(e.degree()) < places)
+    };
     let own_features: Vec<(usize, &Expression)> =
-        family.features.iter().enumerate().filter(|(_, e)| there(e)).collect();
+        family.features.iter().enumerate().filter(|(_, e)| there(e) && is_shown(e)).collect();
     let mut features = Vec::new();
     for owner in &owners {
         for (_, expression) in &own_features {
@@ -348,7 +352,7 @@ fn candidate(
         coefficients,
         parameters,
         grid: grid::points(&family.parameters, &ranges, travel, facts),
-        least: family.least.unwrap_or(family.features.len()),
+        least: family.least.unwrap_or(family.features.len()).min(own_features.len()),
         often: family.often,
     })
 }

@@ -15,6 +15,8 @@ pub struct RecordingFacts {
     /// Median gap between neighbouring distinct positions of every dyad's joint over all recordings, m or rad; the whole travel where
     /// they are few targets visited again and again; 0 where the joint stands still.
     pub spacing: Vec<f64>,
+    /// How many places every dyad's joint was seen at, where they are few targets visited again and again.
+    pub places: Vec<Option<usize>>,
     /// First and last time, s, if all recordings have one.
     pub time: Option<(f64, f64)>,
     /// Duration of the longest recording, s.
@@ -23,6 +25,8 @@ pub struct RecordingFacts {
     pub step: Option<f64>,
     /// Whether samples are settled positions, so that there are no velocities.
     pub settled: bool,
+    /// Whether every sample is an approach of its own to its position, from a side that is told.
+    pub approached: bool,
     /// Extra channels that all recordings have.
     pub channels: Vec<(String, Quantity)>,
     /// Quantities of the readings of a sample, of the recording that has most.
@@ -42,6 +46,8 @@ const POSITIONS: usize = 100_000;
 const PARTS: f64 = 1000.0;
 /// So few parts of the travel with positions in them are targets.
 const FEW: usize = 16;
+/// Targets lie farther apart than this part of the travel.
+const TARGET: f64 = 0.02;
 /// Positions closer than this part of the travel are one.
 const ALIKE: f64 = 1e-6;
 
@@ -57,10 +63,12 @@ impl RecordingFacts {
             // Smallest steps, until all recordings are read.
             dead_bands: vec![f64::INFINITY; dyads],
             spacing: vec![0.0; dyads],
+            places: vec![None; dyads],
             time: None,
             longest: 0.0,
             step: None,
             settled: false,
+            approached: true,
             channels: Vec::new(),
             readings: Vec::new(),
         };
@@ -86,6 +94,7 @@ impl RecordingFacts {
             (facts.time, facts.step, facts.longest) = (None, None, 0.0);
         }
         for (j, positions) in seen.into_iter().enumerate() {
+            facts.places[j] = facts.travel[j].and_then(|travel| places(&positions, travel));
             facts.spacing[j] = facts.travel[j].map_or(0.0, |travel| spacing(positions, travel));
         }
         for (band, travel) in facts.dead_bands.iter_mut().zip(&facts.travel) {
@@ -141,8 +150,10 @@ impl RecordingFacts {
             let step = median(steps.iter().map(|(t, _)| *t));
             self.step = Some(self.step.map_or(step, |s| s.min(step)));
         }
-        self.settled |=
+        let tells_side =
             recording.columns().iter().any(|c| matches!(c.role, crate::recording::Role::Direction(_)));
+        self.settled |= tells_side;
+        self.approached &= tells_side;
         let moving = |j: usize| own[j].map(|(from, to)| to - from).filter(|range| *range > 10.0 * STANDSTILL);
         let largest = (machine.joints())
             .filter_map(|(j, _)| Some(median(steps.iter().map(|(_, s)| s[j])) / moving(j)?))
@@ -173,6 +184,16 @@ fn readings(machine: &Machine, recording: &Recording) -> Vec<Quantity> {
         }
         Measurement::Distance { .. } | Measurement::Displacement => vec![Quantity::Length],
     }
+}
+
+/// Number of targets, where positions are few: what lies closer together than this part of the travel is one.
+fn places(positions: &[f64], (from, to): (f64, f64)) -> Option<usize> {
+    if spacing(positions.to_vec(), (from, to)) < to - from {
+        return None;
+    }
+    let mut sorted = positions.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    Some(1 + sorted.windows(2).filter(|pair| pair[1] - pair[0] > TARGET * (to - from)).count())
 }
 
 /// Median gap between distinct positions; the whole travel where they are few targets again and again, at which any wave can be drawn.

@@ -17,7 +17,14 @@ pub(super) fn range(
     facts: &RecordingFacts,
 ) -> Result<(f64, f64), String> {
     match form.range {
-        Range::Travel => travel.ok_or_else(|| "the joint does not move".into()),
+        Range::Travel => {
+            let (from, to) = travel.ok_or("the joint does not move")?;
+            // Among few targets nobody sees where along the travel something begins and ends.
+            if matches!(form.grid, Grid::Within(..)) && spacing >= to - from {
+                return Err("positions lie too far apart to show it".into());
+            }
+            Ok((from, to))
+        }
         Range::Time => facts.time.ok_or_else(|| NO_TIME.into()).map(|(from, to)| (0.0, to - from)),
         Range::ByKind | Range::Between(..) => {
             let (from, to, dimension) = form.stated(own).ok_or("no range is given for this kind of place")?;

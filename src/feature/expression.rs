@@ -130,6 +130,15 @@ impl Expression {
         }
     }
 
+    /// Highest order of a polynomial in where the own joint stands within its travel; 0 where there is none.
+    pub(crate) fn degree(&self) -> u8 {
+        match self {
+            Expression::Stroke => 1,
+            Expression::Chebyshev(order, e) => order.saturating_mul(e.degree()),
+            _ => self.parts().iter().map(|(part, _)| part.degree()).max().unwrap_or(0),
+        }
+    }
+
     /// Whether this or any part fulfils a condition.
     pub fn any(&self, condition: &dyn Fn(&Expression) -> bool) -> bool {
         condition(self) || self.parts().iter().any(|(part, _)| part.any(condition))

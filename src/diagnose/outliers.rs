@@ -1,0 +1,92 @@
+//! Samples that are no measurement of the machine: stale channels, lost reflectors, slips of a decimal point.
+//!
+//! They are left out of everything that is judged, and told.
+
+use serde::Serialize;
+
+use super::finding::{Diagnosis, rms_of};
+use super::search::Search;
+
+/// Samples of one recording that lie far off their surroundings whatever is taken away.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outliers {
+    /// File name.
+    pub recording: String,
+    /// Their lines in the file.
+    pub lines: Vec<u64>,
+    /// The largest departure of a length, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_m: Option<f64>,
+    /// The largest departure of an angle, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_rad: Option<f64>,
+}
+
+/// RMS of all samples but outliers.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct WithoutOutliers {
+    /// With constant deviations.
+    pub geometric: f64,
+    /// With what was found besides.
+    pub r#final: f64,
+}
+
+/// A reading that was left out counts as an outlier beyond so many standard deviations of the noise, and of what is left of others.
+const FAR: f64 = 6.0;
+
+/// Puts them into the diagnosis. `geometric`, `left`: residuals with constant deviations and with everything found, m and rad.
+pub(super) fn fill(search: &Search, geometric: &[f64], left: &[f64], diagnosis: &mut Diagnosis) {
+    let linear = search.rows.linear;
+    let others = |angle: bool| {
+        let rows =
+            (0..left.len()).filter(|row| linear.angle[*row] == angle && !search.rows.whitener.out[*row]);
+        let squares: Vec<f64> = rows.map(|row| left[row] * left[row]).collect();
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    };
+    let (length, angle) = (others(false), others(true));
+    let (noise_m, noise_rad) = (diagnosis.noise_floor_m, diagnosis.noise_floor_rad);
+    let scatter = |row: usize| match linear.angle[row] {
+        true => noise_rad.map(|sigma| sigma.max(angle)),
+        false => noise_m.map(|sigma| sigma.max(length)),
+    };
+    let is_far = |row: &usize| {
+        search.rows.whitener.out[*row] && scatter(*row).is_some_and(|sigma| left[*row].abs() > FAR * sigma)
+    };
+    let mut all = Vec::new();
+    let mut without: Vec<usize> = Vec::new();
+    for span in &linear.spans {
+        let far: Vec<usize> = (span.rows.0..span.rows.1).filter(is_far).collect();
+        let mut samples: Vec<usize> = far.iter().map(|row| linear.sample[*row]).collect();
+        samples.dedup();
+        if samples.is_empty() {
+            continue;
+        }
+        let largest = |angle: bool| {
+            let own = far.iter().filter(|row| linear.angle[**row] == angle).map(|row| left[*row].abs());
+            own.max_by(f64::total_cmp)
+        };
+        all.push(Outliers {
+            recording: span.label.clone(),
+            lines: samples.iter().map(|sample| linear.lines[*sample]).collect(),
+            largest_m: largest(false),
+            largest_rad: largest(true),
+        });
+        without.extend(samples);
+    }
+    if all.is_empty() {
+        return;
+    }
+    let kept = |residual: &[f64], angle: bool| {
+        let rows = residual.iter().zip(&linear.sample);
+        let zeroed: Vec<f64> =
+            rows.map(|(x, sample)| if without.contains(sample) { 0.0 } else { *x }).collect();
+        let count = linear.lines.len() as f64;
+        rms_of(search, &zeroed, angle)
+            .map(|rms| rms * (count / (count - without.len() as f64).max(1.0)).sqrt())
+    };
+    let both = |angle: bool| {
+        Some(WithoutOutliers { geometric: kept(geometric, angle)?, r#final: kept(left, angle)? })
+    };
+    (diagnosis.rms_without_outliers_m, diagnosis.rms_without_outliers_rad) = (both(false), both(true));
+    diagnosis.outliers = all;
+}
