@@ -188,8 +188,8 @@ pub struct Unexplained {
 
 /// What is left may be this part of what geometry leaves over before nothing counts as explained.
 const TOLERATED: f64 = 0.2;
-/// The shapes of what was found may make up this part of all.
-const SHAPE: f64 = 0.35;
+/// What stretches that were left out hold beyond what the others foretell may be this part of all.
+const SURPRISE: f64 = 0.02;
 /// Structure counts beyond this many standard deviations of chance.
 const CHANCE: f64 = 5.0;
 /// Names of which the data say less than this against the best are listed with it.
@@ -212,20 +212,15 @@ pub(super) fn report(
 ) -> Diagnosis {
     let linear = search.rows.linear;
     let geometric = search.leftover(&search.base);
-    let full = search.beside(active, None);
-    let left = search.leftover(&full);
-    let names = search.beside_names(active);
-    let energy = |space: &super::space::Space| search.rows.residual.dot(&space.apply(&search.rows.residual));
-    let (by_names, by_shapes) =
-        ((energy(&search.base) - energy(&names)).max(0.0), (energy(&names) - energy(&full)).max(0.0));
-    let total = (by_names + by_shapes + left.energy).max(1e-300);
-    let (surprise, bare) = (folds::surprise(search, active, true), folds::surprise(search, active, false));
-    eprintln!(
-        "DBG surprise {surprise:?} {bare:?} names {by_names:.1} shapes {by_shapes:.1} left {:.1} total {total:.1}",
-        left.energy
-    );
+    let shares = search.shares(active);
+    let (left, total) = (&shares.left, shares.total());
+    let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
+    if std::env::var("DBG").is_ok() {
+        eprintln!("DBG surprise {:.1} {:.4} names {:.1} shapes {:.1} left {:.1} total {total:.1} shaped {:?}", surprise/deviation, surprise/total, shares.names, shares.shapes, left.energy, active.iter().map(|e| (&search.candidates[e.candidate].effect, e.shape.ncols())).collect::<Vec<_>>());
+    }
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
-        || by_shapes > SHAPE * total;
+        || shares.is_misshapen(active)
+        || surprise > CHANCE * deviation && surprise > SURPRISE * total;
     let noise_of = |angle: bool| {
         let own = search
             .runs

@@ -5,13 +5,15 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::finding::{Diagnosis, HeldOutPair, HeldOutRms, rms_of};
 use super::search::{Active, Search};
 
-/// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
+/// Every recording is cut into stretches of consecutive samples; a fold leaves every fifth of them out.
 const FOLDS: usize = 5;
+/// So many stretches for each fold where effects of time are judged: what happens once is seen from both sides of each.
+const SHORT: usize = 4;
 
 /// Fits coefficients (geometry and effects, on the linearised model) with each fold left out in turn, and puts what is left there
 /// into the diagnosis. Nonlinear parameters and the choice of effects stay as all samples gave them.
 pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) {
-    let Some(folds) = Folds::new(search, told) else { return };
+    let Some(folds) = Folds::new(search, told, 1) else { return };
     let count = folds.owner.len();
     let constants = folds.raw.ncols() - told.iter().map(|e| e.columns.ncols()).sum::<usize>();
     let mut owner: Vec<Option<usize>> = vec![None; constants];
@@ -42,18 +44,16 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
 
 /// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
 /// `Σ_f (e_f - r_f)·r_f - p`, (67). `None` where there are too few rows.
-pub(super) fn surprise(search: &Search, active: &[Active], shapes: bool) -> Option<(f64, f64)> {
+pub(super) fn surprise(search: &Search, active: &[Active]) -> Option<(f64, f64)> {
     let rows = search.rows;
     let mut white = rows.linear.constant.clone();
     rows.whiten(&mut white);
-    for own in
-        active.iter().flat_map(|effect| [Some(&effect.columns), shapes.then_some(&effect.shape)]).flatten()
-    {
+    for own in active.iter().flat_map(|effect| [&effect.columns, &effect.shape]) {
         let at = white.ncols();
         white = white.insert_columns(at, own.ncols(), 0.0);
         white.columns_mut(at, own.ncols()).copy_from(own);
     }
-    let owner = owners(search)?;
+    let owner = owners(search, 1)?;
     let grams = grams(&white, &rows.residual, &owner);
     let identity = DMatrix::<f64>::identity(white.ncols(), white.ncols());
     let (gram, b) =
@@ -74,8 +74,8 @@ pub(super) fn surprise(search: &Search, active: &[Active], shapes: bool) -> Opti
     Some((sum - p, variance.sqrt()))
 }
 
-/// The fold of each row.
-fn owners(search: &Search) -> Option<Vec<usize>> {
+/// The fold of each row, of each recording so many stretches in each.
+fn owners(search: &Search, stretches: usize) -> Option<Vec<usize>> {
     let linear = search.rows.linear;
     let mut owner = vec![0; linear.residual.len()];
     for span in &linear.spans {
@@ -85,7 +85,7 @@ fn owners(search: &Search) -> Option<Vec<usize>> {
         }
         let rows = span.rows.0..span.rows.1;
         for (fold, sample) in owner[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
-            *fold = (sample - span.samples.0) * FOLDS / count;
+            *fold = (sample - span.samples.0) * stretches * FOLDS / count % FOLDS;
         }
     }
     Some(owner)
@@ -110,11 +110,26 @@ fn grams(
 /// of which nothing tells the noise but what is left of them.
 pub(super) fn useful(search: &Search, active: &[Active]) -> Vec<Active> {
     let mut kept = active.to_vec();
-    while !kept.is_empty() {
-        let Some(folds) = Folds::new(search, &kept) else { return kept };
-        let constants = folds.raw.ncols() - kept.iter().map(|e| e.columns.ncols()).sum::<usize>();
+    while let Some(worst) = harmful(search, &kept) {
+        kept.remove(worst);
+    }
+    kept
+}
+
+/// The effect without which stretches that are left out are predicted best, where that is better than with all. Effects of time are
+/// judged on short stretches.
+pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
+    let of_time =
+        |effect: &Active| search.candidates[effect.candidate].features.iter().any(|f| f.needs_time());
+    let mut worst: Option<(usize, f64)> = None;
+    for (stretches, timed) in [(1, false), (SHORT, true)] {
+        if active.iter().all(|effect| of_time(effect) != timed) {
+            continue;
+        }
+        let Some(folds) = Folds::new(search, active, stretches) else { continue };
+        let constants = folds.raw.ncols() - active.iter().map(|e| e.columns.ncols()).sum::<usize>();
         let mut owner: Vec<Option<usize>> = vec![None; constants];
-        kept.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
+        active.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
         let energy = |but: Option<usize>| {
             let columns: Vec<usize> =
                 (0..owner.len()).filter(|c| owner[*c].is_none() || owner[*c] != but).collect();
@@ -124,13 +139,17 @@ pub(super) fn useful(search: &Search, active: &[Active]) -> Vec<Active> {
             white.iter().map(|x| x * x).sum::<f64>()
         };
         let all = energy(None);
-        let without = (0..kept.len()).map(|i| (i, energy(Some(i))));
-        match without.min_by(|a, b| a.1.total_cmp(&b.1)) {
-            Some((worst, energy)) if energy < all => drop(kept.remove(worst)),
-            _ => break,
+        for (i, effect) in active.iter().enumerate() {
+            if of_time(effect) != timed {
+                continue;
+            }
+            let better = all / energy(Some(i));
+            if better > worst.map_or(1.0, |(_, most)| most) {
+                worst = Some((i, better));
+            }
         }
     }
-    kept
+    worst.map(|(i, _)| i)
 }
 
 /// Normal equations of all samples and of each fold.
@@ -145,7 +164,7 @@ struct Folds {
 
 impl Folds {
     /// `None` where there are too few rows, or a column cannot be built.
-    fn new(search: &Search, told: &[Active]) -> Option<Self> {
+    fn new(search: &Search, told: &[Active], stretches: usize) -> Option<Self> {
         let rows = search.rows;
         let linear = rows.linear;
         let mut raw = linear.constant.clone();
@@ -155,7 +174,7 @@ impl Folds {
             raw = raw.insert_columns(at, count, 0.0);
             raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * effect.score.room));
         }
-        let owner = owners(search)?;
+        let owner = owners(search, stretches)?;
         let mut white = raw.clone();
         rows.whiten(&mut white);
         let grams = grams(&white, &rows.residual, &owner);

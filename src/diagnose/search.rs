@@ -7,6 +7,8 @@ use std::rc::Rc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::evidence::log_mean_exp;
+use super::folds;
 use super::leftover::{Leftover, measure};
 use super::score::{Field, Rows, Score};
 use super::shape;
@@ -74,6 +76,10 @@ const REFINED: usize = 8;
 const ROUNDS: usize = 2;
 const PARABOLAS: usize = 3;
 const HALVINGS: usize = 9;
+/// Effects of more energy (half of it) than this show their shape; of rivals with this part of the best one's, so many are looked at.
+const LARGE: f64 = 300.0;
+const SIMILAR: f64 = 0.8;
+const SHAPED: usize = 5;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
@@ -83,10 +89,37 @@ const OTHER_SHAPE: f64 = 0.001;
 const TONE: f64 = 0.01;
 /// A second line of the same family at the same place takes away at least this part of what the first does.
 const REPEATED: f64 = 0.15;
+/// The shapes of what was found may make up this part of all; less, the more names share it.
+const SHAPE: f64 = 0.35;
+/// An effect that was taken for the shape of another is at least this part of it.
+const HIDDEN: f64 = 0.8;
 /// More effects are not looked for.
 const MOST: usize = 5;
 /// Logarithm of the odds at which an effect is taken in.
 const ENTER: f64 = 8.0;
+
+/// Where the energy goes that constant geometry leaves over, in units of the noise's variance.
+pub(super) struct Shares {
+    /// With the effects as their families say.
+    pub names: f64,
+    /// With the freedom of their shapes.
+    pub shapes: f64,
+    /// With nothing.
+    pub left: Leftover,
+}
+
+impl Shares {
+    /// All of it that stands out from noise.
+    pub fn total(&self) -> f64 {
+        (self.names + self.shapes + self.left.energy).max(1e-300)
+    }
+
+    /// Whether the shapes depart so far from the families' that the names are wrong.
+    pub fn is_misshapen(&self, active: &[Active]) -> bool {
+        let several = active.len().max(2) - 1;
+        self.shapes > SHAPE * self.total() / several as f64
+    }
+}
 
 impl Search<'_> {
     /// Evidence of every candidate beside the active effects, better first.
@@ -135,7 +168,30 @@ impl Search<'_> {
             .collect();
         rivals.splice(..close, refined);
         rivals.sort_by(better_first);
+        // No play is quite a step: what explains nearly as much may do so better once its shape may depart a little from the family's.
+        let most = rivals.first().map_or(0.0, |best| best.score.gain);
+        if most > LARGE {
+            let alike: Vec<usize> =
+                (0..close).filter(|i| rivals[*i].score.gain > SIMILAR * most).take(SHAPED).collect();
+            for i in alike {
+                rivals[i].weight = self.with_shape(&rivals[i], &field);
+            }
+            rivals.sort_by(better_first);
+        }
         rivals
+    }
+
+    /// The weight of a rival of which as likely as not the shape departs from the family's, (66).
+    fn with_shape(&self, rival: &Rival, field: &Field) -> f64 {
+        let Some(effect) = self.enter(rival, &field.space) else { return rival.weight };
+        let shaped = self.rows.field(field.space.with(&effect.shape));
+        let candidate = &self.candidates[rival.candidate];
+        let Some(score) = self.rows.score_at(candidate, &rival.score.parameters, &shaped, self.heat) else {
+            return rival.weight;
+        };
+        let by_shape = field.space.worth(&effect.shape, &field.left, self.heat);
+        let weight = rival.weight + by_shape + score.at_best - rival.score.at_best;
+        log_mean_exp(&[rival.weight, weight])
     }
 
     /// A rival where chance is larger than what it was searched with.
@@ -202,36 +258,68 @@ impl Search<'_> {
         }
         self.swap(&mut active);
         let mut tried: HashSet<Vec<usize>> = HashSet::new();
+        let (mut sound, mut harmful) = (active.clone(), 0);
         while active.len() < MOST {
             // Swaps may throw out what the next step takes in again.
             if !tried.insert(active.iter().map(|effect| effect.candidate).collect()) {
                 break;
             }
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
-            let space = self.beside(&active, None);
-            let rivals = self.rivals(&active);
-            let before = self.leftover(&space);
-            let is_chance = |r: &Rival| r.weight <= ENTER * if self.is_tone(r) { before.band } else { 1.0 };
-            let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
-            let Some(best) = worthy.find(|r| !is_chance(r) && !self.repeats(r, &active)) else { break };
-            let structure = before.energy;
-            if best.score.gain < self.shape_error(best, &active) || 2.0 * best.score.gain < WORTH * structure
-            {
-                break;
-            }
-            let Some(entered) = self.enter(best, &space) else { break };
-            let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
-            active.push(Active { near, ..entered });
-            let left = self.leftover(&self.beside(&active, None));
-            if best.weight < ENTER * (left.heat / self.heat).max(1.0) {
-                active.pop();
-                break;
-            }
+            let Some(entered) = self.next(&active).or_else(|| self.beneath_shapes(&active)) else { break };
+            active.push(entered);
             if active.len() > 1 {
                 self.swap(&mut active);
             }
+            // A name that makes stretches worse that were left out is a patch, unless the next one mends it.
+            harmful = if folds::harmful(self, &active).is_some() { harmful + 1 } else { 0 };
+            match harmful {
+                0 => sound.clone_from(&active),
+                1 => {}
+                _ => break,
+            }
         }
-        active
+        sound
+    }
+
+    /// The effect to be taken in next.
+    fn next(&self, active: &[Active]) -> Option<Active> {
+        let space = self.beside(active, None);
+        let rivals = self.rivals(active);
+        let before = self.leftover(&space);
+        let is_chance = |r: &Rival| r.weight <= ENTER * if self.is_tone(r) { before.band } else { 1.0 };
+        let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
+        let best = worthy.find(|r| !is_chance(r) && !self.repeats(r, active))?;
+        if best.score.gain < self.shape_error(best, active) || 2.0 * best.score.gain < WORTH * before.energy {
+            return None;
+        }
+        let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
+        let entered = Active { near, ..self.enter(best, &space)? };
+        let left = self.leftover(&space.with(&entered.columns).with(&entered.shape));
+        (best.weight >= ENTER * (left.heat / self.heat).max(1.0)).then_some(entered)
+    }
+
+    /// Where the shapes of what was found depart too far from the families', the effect that is most of what they hide.
+    fn beneath_shapes(&self, active: &[Active]) -> Option<Active> {
+        let shares = self.shares(active);
+        if !shares.is_misshapen(active) {
+            return None;
+        }
+        let space = self.beside_names(active);
+        let rivals = self.compare(&space, None);
+        let best = rivals.first().filter(|r| r.weight > ENTER && 2.0 * r.score.gain > HIDDEN * shares.shapes)?;
+        let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
+        Some(Active { near, ..self.enter(best, &space)? })
+    }
+
+    /// What becomes of the energy that geometry leaves over.
+    pub fn shares(&self, active: &[Active]) -> Shares {
+        let (names, full) = (self.beside_names(active), self.beside(active, None));
+        let energy = |space: &Space| self.rows.residual.dot(&space.apply(&self.rows.residual));
+        Shares {
+            names: (energy(&self.base) - energy(&names)).max(0.0),
+            shapes: (energy(&names) - energy(&full)).max(0.0),
+            left: self.leftover(&full),
+        }
     }
 
     /// Whether it is a wave in time: noise whose colour is not quite known has many.

@@ -61,6 +61,17 @@ impl Space {
         Space { w: wt.transpose(), wt }
     }
 
+    /// Logarithm of the evidence of further columns, each times its prior standard deviation, with what is left of `y` beside the space.
+    pub fn worth(&self, columns: &DMatrix<f64>, left: &DVector<f64>, heat: f64) -> f64 {
+        let mut mc = columns.clone();
+        mc.gemm(-1.0, &self.w, &self.along(&columns.as_view()), 1.0);
+        let inner = DMatrix::identity(columns.ncols(), columns.ncols()) + columns.tr_mul(&mc) / heat;
+        let Some(factor) = Cholesky::new(inner) else { return 0.0 };
+        let toward = columns.tr_mul(left) / heat;
+        0.5 * toward.dot(&factor.solve(&toward))
+            - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+    }
+
     /// `M x`.
     pub fn apply(&self, x: &DVector<f64>) -> DVector<f64> {
         let along = self.w.tr_mul(x);
