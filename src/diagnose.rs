@@ -18,14 +18,16 @@ mod search;
 mod shape;
 mod space;
 mod spectrum;
+mod stretch;
 mod traces;
+mod unexplained;
 mod waves;
 
-pub use finding::{
-    Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size, Unexplained, Where,
-};
+pub use finding::{Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size};
 pub use outliers::{Outliers, WithoutOutliers};
+pub use stretch::Where;
 pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
+pub use unexplained::{Gathering, Unexplained};
 
 use std::cell::RefCell;
 
@@ -68,7 +70,10 @@ pub fn diagnose(
     let candidates = library.candidates(machine, &facts);
     let runs = noise::runs(&linear);
     let coarse = Coarse::new(&linear, candidates.all.len());
-    let out = noise::outliers(&linear.residual, &runs, facts_are_smooth(&facts));
+    let mut out = noise::outliers(&linear.residual, &runs, facts_are_smooth(&facts));
+    if facts_are_smooth(&facts) {
+        out.iter_mut().zip(noise::waiting(&linear)).for_each(|(out, waiting)| *out |= waiting);
+    }
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
 
@@ -131,7 +136,10 @@ fn noise_of(
         {
             return noise;
         }
-        noise::estimate(left, &own, out, smooth)
+        match !smooth && facts.time.is_some() && noise::without_order(linear) {
+            true => noise::remembered(left, &own, out),
+            false => noise::estimate(left, &own, out, smooth),
+        }
     };
     let (length, angle) = (estimate(false), estimate(true));
     runs.iter()

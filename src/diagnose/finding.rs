@@ -1,6 +1,6 @@
 //! What a diagnosis says, as data: `docs/diagnosis.md`.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use serde::Serialize;
 
 use super::folds;
@@ -8,7 +8,9 @@ use super::held_out::{self, Model};
 use super::noise::Noise;
 use super::outliers::{self, Outliers, WithoutOutliers};
 use super::search::{Active, Rival, Search};
+use super::stretch::{Where, wheres};
 use super::traces::{self, Traces};
+use super::unexplained::{self, Unexplained};
 use crate::effects::{Identified, Library, StoredEffect, in_words};
 use crate::feature::Dimension;
 use crate::identify::BeforeAfter;
@@ -145,21 +147,6 @@ pub struct Size {
     pub std_error: f64,
 }
 
-/// A stretch of a recording.
-#[derive(Clone, Debug, Serialize)]
-pub struct Where {
-    /// File name.
-    pub recording: String,
-    /// Start, s; absent without time.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub from_s: Option<f64>,
-    /// End, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub to_s: Option<f64>,
-    /// Part of what geometry leaves over.
-    pub share_of_misfit: f64,
-}
-
 /// Another name for the same.
 #[derive(Clone, Debug, Serialize)]
 pub struct Confusable {
@@ -173,27 +160,21 @@ pub struct Confusable {
     pub separate_by: String,
 }
 
-/// Structure that no family explains.
-#[derive(Clone, Debug, Serialize)]
-pub struct Unexplained {
-    /// How large it is, m (rad where only angles are measured).
-    pub rms_m: f64,
-    /// The place that it fits best.
-    pub at: String,
-    /// Where it acts.
-    pub r#where: Vec<Where>,
-    /// In a sentence.
-    pub explanation: String,
-}
-
 /// What is left may be this part of what geometry leaves over before nothing counts as explained.
 const TOLERATED: f64 = 0.2;
-/// What stretches that were left out hold beyond what the others foretell may be this part of all.
-const SURPRISE: f64 = 0.02;
+/// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
+/// leaves fewer independent readings.
+const SURPRISE: f64 = 0.003;
 /// Structure counts beyond this many standard deviations of chance.
 const CHANCE: f64 = 5.0;
 /// Names of which the data say less than this against the best are listed with it.
 const LISTED: f64 = 0.05;
+/// How often the true shape of an effect is none of its family's, and the part of its energy by which that may shift the odds of other
+/// names for the same place.
+const UNSURE: f64 = 0.2;
+const SHIFT: f64 = 0.006;
+/// Names that are so likely besides the best one, as their weights may shift, are listed too.
+const ALIKE: f64 = 0.15;
 /// Logarithm of the odds at which a finding is told.
 const TOLD: f64 = 5.0;
 
@@ -216,11 +197,23 @@ pub(super) fn report(
     let (left, total) = (&shares.left, shares.total());
     let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
     if std::env::var("DBG").is_ok() {
-        eprintln!("DBG surprise {:.1} {:.4} names {:.1} shapes {:.1} left {:.1} total {total:.1} shaped {:?}", surprise/deviation, surprise/total, shares.names, shares.shapes, left.energy, active.iter().map(|e| (&search.candidates[e.candidate].effect, e.shape.ncols())).collect::<Vec<_>>());
+        eprintln!(
+            "DBG surprise {:.1} {:.4} names {:.1} shapes {:.1} left {:.1} total {total:.1} shaped {:?}",
+            surprise / deviation,
+            surprise / total,
+            shares.names,
+            shares.shapes,
+            left.energy,
+            active
+                .iter()
+                .map(|e| (&search.candidates[e.candidate].effect, e.shape.ncols()))
+                .collect::<Vec<_>>()
+        );
     }
+    let memory = noise.iter().map(|n| (1.0 + n.rho) / (1.0 - n.rho)).fold(1.0, f64::max);
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
-        || shares.is_misshapen(active)
-        || surprise > CHANCE * deviation && surprise > SURPRISE * total;
+        || shares.is_misshapen(active.len())
+        || surprise > CHANCE * left.heat.max(1.0) * deviation && surprise > SURPRISE * memory * total;
     let noise_of = |angle: bool| {
         let own = search
             .runs
@@ -240,9 +233,8 @@ pub(super) fn report(
         if is_unexplained {
             continue;
         }
-        let all: f64 =
-            rivals.iter().map(|r| (r.weight - own.weight).exp()).sum::<f64>() + (-own.weight).exp();
-        let probability = all.recip();
+        let odds = odds(search, &rivals, own);
+        let probability = odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
         let candidate = &search.candidates[effect.candidate];
         let family = &library.families()[candidate.family];
         let solved = model.effect(search, active, i);
@@ -261,10 +253,10 @@ pub(super) fn report(
                 .map(|u| effect.score.room * u)
                 .collect(),
         });
-        let confusable_with = rivals
+        let confusable_with = odds
             .iter()
-            .filter(|r| r.candidate != effect.candidate && (r.weight - own.weight).exp() > LISTED)
-            .map(|r| confusable(r, own, probability, search, machine, family))
+            .filter(|(.., listed)| *listed)
+            .map(|(r, p, _)| confusable(r, *p, search, machine, family))
             .collect();
         findings.push(Finding {
             effect: candidate.effect.clone(),
@@ -283,13 +275,14 @@ pub(super) fn report(
             delta_bic: 2.0 * own.weight,
             held_out_rms_m: None,
             held_out_rms_rad: None,
-            r#where: wheres(search, &effect.columns),
+            r#where: wheres(search, &|row| effect.columns.row(row).norm_squared()),
             confusable_with,
             share: 0.0,
         });
         kept.push(i);
     }
     let unexplained = is_unexplained.then(|| {
+        let left_by_geometry = search.base.apply(&search.rows.residual);
         let at = search
             .rivals(active)
             .first()
@@ -301,14 +294,13 @@ pub(super) fn report(
             Some(_) => format!("{:.2} um", 1e6 * rms_m),
             None => in_words(rms_m, None, Dimension::ANGLE, None),
         };
-        Unexplained {
-            rms_m,
-            at: at.clone(),
-            r#where: Vec::new(),
-            explanation: format!(
-                "structure of {size} is left that no named effect explains; it fits best at {at}"
-            ),
+        let (r#where, gathers) = unexplained::gathered(search, machine, left_by_geometry.as_slice());
+        let mut explanation =
+            format!("structure of {size} is left that no named effect explains; it fits best at {at}");
+        for gathering in &gathers {
+            explanation += &format!("; {}", gathering.in_words());
         }
+        Unexplained { rms_m, at, r#where, gathers, explanation }
     });
     let told: Vec<Active> = kept.iter().map(|i| active[*i].clone()).collect();
     let left_over = Model::new(search, &told).residual(search, &told);
@@ -354,9 +346,29 @@ pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f
     (!samples.is_empty()).then(|| (squares / samples.len() as f64).sqrt())
 }
 
+/// Probability of every rival, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.
+/// With each whether it is listed.
+fn odds<'a>(search: &Search, rivals: &'a [Rival], own: &Rival) -> Vec<(&'a Rival, f64, bool)> {
+    let place = |r: &Rival| search.candidates[r.candidate].place;
+    let effect = |r: &Rival| &search.candidates[r.candidate].effect;
+    let plain = |r: &Rival| (r.weight - own.weight).exp();
+    let shift = 1.0 + SHIFT * own.score.gain;
+    let shifted = |r: &Rival| {
+        let is_alike = place(r) == place(own) && (effect(r) != effect(own) || r.candidate == own.candidate);
+        if is_alike { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
+    };
+    let nothing = (-own.weight).exp();
+    let (all, all_alike) =
+        (rivals.iter().map(plain).sum::<f64>() + nothing, rivals.iter().map(shifted).sum::<f64>());
+    let beside = rivals.iter().filter(|r| place(r) == place(own)).map(plain).sum::<f64>() / all;
+    let probability =
+        |r: &Rival| (1.0 - UNSURE) * plain(r) / all + UNSURE * beside * shifted(r) / all_alike;
+    let listed = |r: &Rival| probability(r) > LISTED * probability(own) || shifted(r) > ALIKE;
+    rivals.iter().map(|r| (r, probability(r), r.candidate != own.candidate && listed(r))).collect()
+}
+
 fn confusable(
     rival: &Rival,
-    own: &Rival,
     probability: f64,
     search: &Search,
     machine: &Machine,
@@ -372,43 +384,8 @@ fn confusable(
             |l| l.separate_by.replace("{at}", &at),
         ),
         at,
-        probability: probability * (rival.weight - own.weight).exp(),
+        probability,
     }
-}
-
-/// In which recordings an effect's columns have their energy, and when.
-fn wheres(search: &Search, columns: &DMatrix<f64>) -> Vec<Where> {
-    let linear = search.rows.linear;
-    let energy = |row: usize| columns.row(row).norm_squared();
-    let all: f64 = columns.norm_squared().max(1e-300);
-    let mut list: Vec<Where> = Vec::new();
-    for (s, span) in linear.spans.iter().enumerate() {
-        let own: f64 = (span.rows.0..span.rows.1).map(energy).sum();
-        if own < 0.02 * all {
-            continue;
-        }
-        let time = linear.samples[s].time.as_deref();
-        let at = |row: usize| time.map(|t| t[linear.sample[row] - span.samples.0]);
-        let mut sum = 0.0;
-        let (mut from, mut to) = (None, None);
-        for row in span.rows.0..span.rows.1 {
-            sum += energy(row);
-            if from.is_none() && sum > 0.02 * own {
-                from = at(row);
-            }
-            if to.is_none() && sum > 0.98 * own {
-                to = at(row);
-            }
-        }
-        list.push(Where {
-            recording: span.label.clone(),
-            from_s: from,
-            to_s: to,
-            share_of_misfit: own / all,
-        });
-    }
-    list.sort_by(|a, b| b.share_of_misfit.total_cmp(&a.share_of_misfit));
-    list
 }
 
 /// A vector of zeros with the same length as the residuals.

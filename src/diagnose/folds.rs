@@ -5,15 +5,13 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::finding::{Diagnosis, HeldOutPair, HeldOutRms, rms_of};
 use super::search::{Active, Search};
 
-/// Every recording is cut into stretches of consecutive samples; a fold leaves every fifth of them out.
+/// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
 const FOLDS: usize = 5;
-/// So many stretches for each fold where effects of time are judged: what happens once is seen from both sides of each.
-const SHORT: usize = 4;
 
 /// Fits coefficients (geometry and effects, on the linearised model) with each fold left out in turn, and puts what is left there
 /// into the diagnosis. Nonlinear parameters and the choice of effects stay as all samples gave them.
 pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) {
-    let Some(folds) = Folds::new(search, told, 1) else { return };
+    let Some(folds) = Folds::new(search, told) else { return };
     let count = folds.owner.len();
     let constants = folds.raw.ncols() - told.iter().map(|e| e.columns.ncols()).sum::<usize>();
     let mut owner: Vec<Option<usize>> = vec![None; constants];
@@ -43,28 +41,15 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
 }
 
 /// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
-/// `Σ_f (e_f - r_f)·r_f - p`, (67). `None` where there are too few rows.
+/// `Σ_f (e_f - r_f)·r_f - p`, (67), and the standard deviation of that by chance. `None` where there are too few rows.
 pub(super) fn surprise(search: &Search, active: &[Active]) -> Option<(f64, f64)> {
-    let rows = search.rows;
-    let mut white = rows.linear.constant.clone();
-    rows.whiten(&mut white);
-    for own in active.iter().flat_map(|effect| [&effect.columns, &effect.shape]) {
-        let at = white.ncols();
-        white = white.insert_columns(at, own.ncols(), 0.0);
-        white.columns_mut(at, own.ncols()).copy_from(own);
-    }
-    let owner = owners(search, 1)?;
-    let grams = grams(&white, &rows.residual, &owner);
-    let identity = DMatrix::<f64>::identity(white.ncols(), white.ncols());
-    let (gram, b) =
-        grams.iter().fold((identity.clone(), DVector::zeros(white.ncols())), |(gram, b), (own, toward)| {
-            (gram + own, b + toward)
-        });
+    let normal = Normal::new(search, active)?;
+    let (gram, b) = normal.without(None);
     let all = Cholesky::new(gram.clone())?;
     let x = all.solve(&b);
-    let p = white.ncols() as f64 - all.inverse().trace();
+    let p = b.len() as f64 - all.inverse().trace();
     let (mut sum, mut variance) = (0.0, 0.0);
-    for (own, toward) in &grams {
+    for (own, toward) in &normal.folds {
         let part = all.solve(own);
         variance += 2.0 * part.tr_mul(&part.transpose()).trace();
         let without = Cholesky::new(&gram - own)?.solve(&(&b - toward));
@@ -74,8 +59,65 @@ pub(super) fn surprise(search: &Search, active: &[Active]) -> Option<(f64, f64)>
     Some((sum - p, variance.sqrt()))
 }
 
-/// The fold of each row, of each recording so many stretches in each.
-fn owners(search: &Search, stretches: usize) -> Option<Vec<usize>> {
+/// The effect without which stretches that are left out are foretold best, where that is better than with all, (68): a patch.
+pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
+    let normal = Normal::new(search, active)?;
+    let all = normal.foretold(None)?;
+    let without = (0..active.len()).filter_map(|i| Some((i, normal.foretold(Some(i))?)));
+    without.filter(|(_, score)| *score > all).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+}
+
+/// Whitened normal equations of each fold, with everything that an effect brings along: states and shape.
+struct Normal {
+    folds: Vec<(DMatrix<f64>, DVector<f64>)>,
+    /// Of each column, which effect it belongs to.
+    owner: Vec<Option<usize>>,
+}
+
+impl Normal {
+    fn new(search: &Search, active: &[Active]) -> Option<Self> {
+        let rows = search.rows;
+        let fold_of = owners(search)?;
+        let mut white = rows.linear.constant.clone();
+        rows.whiten(&mut white);
+        let mut owner = vec![None; white.ncols()];
+        for (i, effect) in active.iter().enumerate() {
+            for own in [&effect.columns, &effect.state, &effect.shape] {
+                let at = white.ncols();
+                white = white.insert_columns(at, own.ncols(), 0.0);
+                white.columns_mut(at, own.ncols()).copy_from(own);
+                owner.extend(vec![Some(i); own.ncols()]);
+            }
+        }
+        Some(Normal { folds: grams(&white, &rows.residual, &fold_of), owner })
+    }
+
+    /// The sum over all folds but one, with the prior.
+    fn without(&self, fold: Option<usize>) -> (DMatrix<f64>, DVector<f64>) {
+        let width = self.owner.len();
+        let start = (DMatrix::identity(width, width), DVector::zeros(width));
+        let used = self.folds.iter().enumerate().filter(|(f, _)| Some(*f) != fold);
+        used.fold(start, |(gram, b), (_, (own, toward))| (gram + own, b + toward))
+    }
+
+    /// Logarithm of the probability of every fold, given all others, without one effect.
+    fn foretold(&self, but: Option<usize>) -> Option<f64> {
+        let columns: Vec<usize> =
+            (0..self.owner.len()).filter(|c| self.owner[*c].is_none() || self.owner[*c] != but).collect();
+        let evidence = |fold: Option<usize>| {
+            let (gram, b) = self.without(fold);
+            let (gram, b) = (gram.select_rows(&columns).select_columns(&columns), b.select_rows(&columns));
+            let factor = Cholesky::new(gram)?;
+            let determinant = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            Some(0.5 * b.dot(&factor.solve(&b)) - determinant)
+        };
+        let all = evidence(None)?;
+        (0..FOLDS).map(|fold| Some(all - evidence(Some(fold))?)).sum()
+    }
+}
+
+/// The fold of each row.
+fn owners(search: &Search) -> Option<Vec<usize>> {
     let linear = search.rows.linear;
     let mut owner = vec![0; linear.residual.len()];
     for span in &linear.spans {
@@ -85,7 +127,7 @@ fn owners(search: &Search, stretches: usize) -> Option<Vec<usize>> {
         }
         let rows = span.rows.0..span.rows.1;
         for (fold, sample) in owner[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
-            *fold = (sample - span.samples.0) * stretches * FOLDS / count % FOLDS;
+            *fold = (sample - span.samples.0) * FOLDS / count;
         }
     }
     Some(owner)
@@ -110,46 +152,12 @@ fn grams(
 /// of which nothing tells the noise but what is left of them.
 pub(super) fn useful(search: &Search, active: &[Active]) -> Vec<Active> {
     let mut kept = active.to_vec();
-    while let Some(worst) = harmful(search, &kept) {
+    while let Some(folds) = Folds::new(search, &kept) {
+        let better = folds.without_each(search, &kept).into_iter().enumerate().filter(|(_, b)| *b > 1.0);
+        let Some((worst, _)) = better.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
         kept.remove(worst);
     }
     kept
-}
-
-/// The effect without which stretches that are left out are predicted best, where that is better than with all. Effects of time are
-/// judged on short stretches.
-pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
-    let of_time =
-        |effect: &Active| search.candidates[effect.candidate].features.iter().any(|f| f.needs_time());
-    let mut worst: Option<(usize, f64)> = None;
-    for (stretches, timed) in [(1, false), (SHORT, true)] {
-        if active.iter().all(|effect| of_time(effect) != timed) {
-            continue;
-        }
-        let Some(folds) = Folds::new(search, active, stretches) else { continue };
-        let constants = folds.raw.ncols() - active.iter().map(|e| e.columns.ncols()).sum::<usize>();
-        let mut owner: Vec<Option<usize>> = vec![None; constants];
-        active.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
-        let energy = |but: Option<usize>| {
-            let columns: Vec<usize> =
-                (0..owner.len()).filter(|c| owner[*c].is_none() || owner[*c] != but).collect();
-            let left = folds.left_out(search, &columns);
-            let mut white = vec![0.0; left.len()];
-            search.rows.whitener.apply(&left, &mut white);
-            white.iter().map(|x| x * x).sum::<f64>()
-        };
-        let all = energy(None);
-        for (i, effect) in active.iter().enumerate() {
-            if of_time(effect) != timed {
-                continue;
-            }
-            let better = all / energy(Some(i));
-            if better > worst.map_or(1.0, |(_, most)| most) {
-                worst = Some((i, better));
-            }
-        }
-    }
-    worst.map(|(i, _)| i)
 }
 
 /// Normal equations of all samples and of each fold.
@@ -164,7 +172,7 @@ struct Folds {
 
 impl Folds {
     /// `None` where there are too few rows, or a column cannot be built.
-    fn new(search: &Search, told: &[Active], stretches: usize) -> Option<Self> {
+    fn new(search: &Search, told: &[Active]) -> Option<Self> {
         let rows = search.rows;
         let linear = rows.linear;
         let mut raw = linear.constant.clone();
@@ -174,11 +182,28 @@ impl Folds {
             raw = raw.insert_columns(at, count, 0.0);
             raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * effect.score.room));
         }
-        let owner = owners(search, stretches)?;
+        let owner = owners(search)?;
         let mut white = raw.clone();
         rows.whiten(&mut white);
         let grams = grams(&white, &rows.residual, &owner);
         Some(Folds { raw, owner, grams })
+    }
+
+    /// By which factor the mean square of what is left out grows with each effect beside all others.
+    fn without_each(&self, search: &Search, active: &[Active]) -> Vec<f64> {
+        let constants = self.raw.ncols() - active.iter().map(|e| e.columns.ncols()).sum::<usize>();
+        let mut owner: Vec<Option<usize>> = vec![None; constants];
+        active.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
+        let energy = |but: Option<usize>| {
+            let columns: Vec<usize> =
+                (0..owner.len()).filter(|c| owner[*c].is_none() || owner[*c] != but).collect();
+            let left = self.left_out(search, &columns);
+            let mut white = vec![0.0; left.len()];
+            search.rows.whitener.apply(&left, &mut white);
+            white.iter().map(|x| x * x).sum::<f64>()
+        };
+        let all = energy(None);
+        (0..active.len()).map(|i| all / energy(Some(i))).collect()
     }
 
     /// Residuals of every row under the fit of these columns to the folds that the row is not in, m and rad.

@@ -109,6 +109,27 @@ pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> V
     out
 }
 
+/// A joint stands still within this part of its travel.
+const STILL: f64 = 1e-4;
+
+/// Rows before anything moves in its recording: nobody knows from where the joints came to where they wait, and so in what state play,
+/// friction and filters are. Recordings that stand still for half of their samples or more are meant to.
+pub(super) fn waiting(linear: &Linear) -> Vec<bool> {
+    let mut waiting = vec![false; linear.residual.len()];
+    for (span, samples) in linear.spans.iter().zip(&linear.samples) {
+        let moved = samples.joints.iter().flatten().filter_map(|joint| {
+            let start = *joint.position.first()?;
+            let far = joint.position.iter().fold(0.0f64, |far, q| far.max((q - start).abs()));
+            joint.position.iter().position(|q| (q - start).abs() > STILL * far)
+        });
+        let still = moved.min().filter(|still| 2 * still < samples.len).unwrap_or(0);
+        for row in span.rows.0..span.rows.1 {
+            waiting[row] = linear.sample[row] - span.samples.0 < still.saturating_sub(1);
+        }
+    }
+    waiting
+}
+
 /// Half the mean square of differences over `lag` readings, outliers left out, what is beyond four standard deviations cut off.
 fn structure(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], lag: usize) -> Option<f64> {
     let mut squares: Vec<f64> = Vec::new();
@@ -166,6 +187,36 @@ pub(super) fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smo
     let rho = if rho < 0.03 { 0.0 } else { rho };
     let sigma2 = if rho == 0.0 { one } else { one / (1.0 - rho) };
     Noise { sigma: sigma2.min(1.05 * total).sqrt().max(FINEST), rho }
+}
+
+/// Neighbours that go together by less than this are in no order.
+const NO_ORDER: f64 = 0.3;
+/// So many readings tell whether noise is remembered from one position to the next, beyond so many standard deviations of chance.
+const POSITIONS: usize = 40;
+const REMEMBERED: f64 = 2.5;
+
+/// Whether settled positions follow each other without order, so that what neighbours have in common is no misfit of the machine.
+pub(super) fn without_order(linear: &Linear) -> bool {
+    let joints = linear.samples.first().map_or(0, |s| s.joints.len());
+    let alike = |j: usize| {
+        let columns = || linear.samples.iter().filter_map(|s| s.joints[j].as_ref());
+        let count = columns().map(|c| c.position.len()).sum::<usize>().max(1) as f64;
+        let mean = columns().flat_map(|c| &c.position).sum::<f64>() / count;
+        let own = columns().flat_map(|c| &c.position).map(|q| (q - mean).powi(2)).sum::<f64>();
+        let pairs = columns().flat_map(|c| c.position.windows(2));
+        let common = pairs.map(|pair| (pair[0] - mean) * (pair[1] - mean)).sum::<f64>();
+        if own > 0.0 { common / own } else { 0.0 }
+    };
+    (0..joints).all(|j| alike(j) < NO_ORDER)
+}
+
+/// Noise of settled positions without order: what is left, and what neighbours have in common.
+pub(super) fn remembered(residual: &[f64], runs: &[&Vec<usize>], out: &[bool]) -> Noise {
+    let noise = estimate(residual, runs, out, false);
+    let count = runs.iter().flat_map(|run| run.iter()).filter(|row| !out[**row]).count();
+    let rho = neighbours(residual, runs, out);
+    let is_chance = count < POSITIONS || rho * (count as f64).sqrt() < REMEMBERED;
+    Noise { rho: if is_chance { 0.0 } else { rho.min(MOST_RHO) }, ..noise }
 }
 
 /// So many differences within groups of repeated approaches say what the noise is.

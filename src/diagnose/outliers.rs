@@ -43,6 +43,7 @@ pub(super) fn fill(search: &Search, geometric: &[f64], left: &[f64], diagnosis: 
         let squares: Vec<f64> = rows.map(|row| left[row] * left[row]).collect();
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     };
+    let waiting = super::noise::waiting(linear);
     let (length, angle) = (others(false), others(true));
     let (noise_m, noise_rad) = (diagnosis.noise_floor_m, diagnosis.noise_floor_rad);
     let scatter = |row: usize| match linear.angle[row] {
@@ -50,7 +51,9 @@ pub(super) fn fill(search: &Search, geometric: &[f64], left: &[f64], diagnosis: 
         false => noise_m.map(|sigma| sigma.max(length)),
     };
     let is_far = |row: &usize| {
-        search.rows.whitener.out[*row] && scatter(*row).is_some_and(|sigma| left[*row].abs() > FAR * sigma)
+        search.rows.whitener.out[*row]
+            && !waiting[*row]
+            && scatter(*row).is_some_and(|sigma| left[*row].abs() > FAR * sigma)
     };
     let mut all = Vec::new();
     let mut without: Vec<usize> = Vec::new();

@@ -25,6 +25,8 @@ pub(super) struct Active {
     pub columns: DMatrix<f64>,
     /// Its coefficients, in units of the columns.
     pub solution: DVector<f64>,
+    /// Whitened columns of what it may have been before anybody looked.
+    pub state: DMatrix<f64>,
     /// Whitened columns by which its shape may depart from the family's.
     pub shape: DMatrix<f64>,
     /// Candidates that might take its place.
@@ -79,14 +81,14 @@ const HALVINGS: usize = 9;
 /// Effects of more energy (half of it) than this show their shape; of rivals with this part of the best one's, so many are looked at.
 const LARGE: f64 = 300.0;
 const SIMILAR: f64 = 0.8;
-const SHAPED: usize = 5;
+const SHAPED: usize = 8;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
-const OWN_SHAPE: f64 = 0.004;
-const OTHER_SHAPE: f64 = 0.001;
-/// A tone is heard in the edges of every other shape.
-const TONE: f64 = 0.01;
+const OWN_SHAPE: f64 = 0.01;
+const OTHER_SHAPE: f64 = 0.003;
+/// A tone is heard in the edges of every other shape, and one course over time in another.
+const CLOCK_SHAPE: f64 = 0.01;
 /// A second line of the same family at the same place takes away at least this part of what the first does.
 const REPEATED: f64 = 0.15;
 /// The shapes of what was found may make up this part of all; less, the more names share it.
@@ -115,8 +117,8 @@ impl Shares {
     }
 
     /// Whether the shapes depart so far from the families' that the names are wrong.
-    pub fn is_misshapen(&self, active: &[Active]) -> bool {
-        let several = active.len().max(2) - 1;
+    pub fn is_misshapen(&self, effects: usize) -> bool {
+        let several = effects.max(2) - 1;
         self.shapes > SHAPE * self.total() / several as f64
     }
 }
@@ -141,7 +143,7 @@ impl Search<'_> {
         if let Some(known) = known.get(&(None, marks.clone())).or_else(|| known.get(&(of, marks.clone()))) {
             return known.clone();
         }
-        let rivals = Rc::new(self.compare(&self.beside(active, but), among));
+        let rivals = Rc::new(self.compare(&self.ground(active, but), among));
         known.insert((among.and(of), marks), rivals.clone());
         rivals
     }
@@ -170,6 +172,18 @@ impl Search<'_> {
         rivals.sort_by(better_first);
         // No play is quite a step: what explains nearly as much may do so better once its shape may depart a little from the family's.
         let most = rivals.first().map_or(0.0, |best| best.score.gain);
+        if std::env::var("DBG").is_ok() {
+            eprintln!(" among {:?}", among.map(|a| a.len()));
+            for (k, r) in rivals.iter().enumerate() {
+                let n = &candidates[r.candidate].effect;
+                if k < 12 || (k < 120 && n.contains("drift")) {
+                    eprintln!(
+                        "  RIV {k} {n} {:?} w {:.0} g {:.0} {:?}",
+                        candidates[r.candidate].place, r.weight, r.score.gain, r.score.parameters
+                    );
+                }
+            }
+        }
         if most > LARGE {
             let alike: Vec<usize> =
                 (0..close).filter(|i| rivals[*i].score.gain > SIMILAR * most).take(SHAPED).collect();
@@ -184,12 +198,32 @@ impl Search<'_> {
     /// The weight of a rival of which as likely as not the shape departs from the family's, (66).
     fn with_shape(&self, rival: &Rival, field: &Field) -> f64 {
         let Some(effect) = self.enter(rival, &field.space) else { return rival.weight };
-        let shaped = self.rows.field(field.space.with(&effect.shape));
+        let with_state = self.rows.field(field.space.with(&effect.state));
+        let shaped = self.rows.field(with_state.space.with(&effect.shape));
         let candidate = &self.candidates[rival.candidate];
         let Some(score) = self.rows.score_at(candidate, &rival.score.parameters, &shaped, self.heat) else {
             return rival.weight;
         };
-        let by_shape = field.space.worth(&effect.shape, &field.left, self.heat);
+        let by_shape = field.space.worth(&effect.state, &field.left, self.heat)
+            + with_state.space.worth(&effect.shape, &with_state.left, self.heat);
+        if std::env::var("DBG").is_ok() {
+            let r = &self.rows.residual;
+            let e = |s: &Space| r.dot(&s.apply(r));
+            let n = field.space.with(&effect.columns).with(&effect.state);
+            let f = n.with(&effect.shape);
+            eprintln!(
+                "SHP {} {:?} weight {:.0} plain {:.0} total {:.0} names {:.0} shapes {:.0} left {:.0} / {}",
+                candidate.effect,
+                candidate.place,
+                rival.weight + by_shape + score.at_best - rival.score.at_best,
+                rival.weight,
+                e(&field.space),
+                e(&field.space) - e(&n),
+                e(&n) - e(&f),
+                e(&f),
+                self.rows.whitener.count()
+            );
+        }
         let weight = rival.weight + by_shape + score.at_best - rival.score.at_best;
         log_mean_exp(&[rival.weight, weight])
     }
@@ -204,12 +238,29 @@ impl Search<'_> {
     /// The space beside all active effects but one.
     pub fn beside(&self, active: &[Active], but: Option<usize>) -> Space {
         let others = active.iter().enumerate().filter(|(i, _)| Some(*i) != but);
-        others.fold(self.base.clone(), |space, (_, effect)| space.with(&effect.columns).with(&effect.shape))
+        others.fold(self.base.clone(), |space, (_, effect)| {
+            space.with(&effect.columns).with(&effect.state).with(&effect.shape)
+        })
+    }
+
+    /// The space beside all active effects but one, their shapes as the families' where they would depart too far: what is hidden there
+    /// is another effect, or unexplained.
+    fn ground(&self, active: &[Active], but: Option<usize>) -> Space {
+        let others: Vec<Active> = active
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| Some(*i) != but)
+            .map(|(_, effect)| effect.clone())
+            .collect();
+        match !others.is_empty() && self.shares(&others).is_misshapen(others.len()) {
+            true => self.beside_names(&others),
+            false => self.beside(&others, None),
+        }
     }
 
     /// The space beside the names alone, as if their shapes were the families'.
     pub fn beside_names(&self, active: &[Active]) -> Space {
-        active.iter().fold(self.base.clone(), |space, effect| space.with(&effect.columns))
+        active.iter().fold(self.base.clone(), |space, effect| space.with(&effect.columns).with(&effect.state))
     }
 
     /// What is left beside the active effects.
@@ -228,9 +279,11 @@ impl Search<'_> {
         let gram = columns.tr_mul(&columns) - along.tr_mul(&along)
             + DMatrix::identity(score.coefficients, score.coefficients);
         let solution = gram.cholesky()?.solve(&columns.tr_mul(&space.apply(&self.rows.residual)));
-        let shape = DMatrix::zeros(columns.nrows(), 0);
+        let none = DMatrix::zeros(columns.nrows(), 0);
+        let (state, shape) = (none.clone(), none);
         let mut effect =
-            Active { candidate: rival.candidate, score, columns, solution, shape, near: Vec::new() };
+            Active { candidate: rival.candidate, score, columns, solution, state, shape, near: Vec::new() };
+        effect.state = shape::states(self.rows, candidate, &effect);
         effect.shape = shape::columns(self.rows, candidate, &effect);
         Some(effect)
     }
@@ -265,13 +318,27 @@ impl Search<'_> {
                 break;
             }
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
-            let Some(entered) = self.next(&active).or_else(|| self.beneath_shapes(&active)) else { break };
+            let Some(entered) = self.next(&active) else { break };
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "ENTER {} {:?} g {:.0}",
+                    self.candidates[entered.candidate].effect,
+                    self.candidates[entered.candidate].place,
+                    entered.score.gain
+                );
+            }
             active.push(entered);
             if active.len() > 1 {
                 self.swap(&mut active);
             }
             // A name that makes stretches worse that were left out is a patch, unless the next one mends it.
             harmful = if folds::harmful(self, &active).is_some() { harmful + 1 } else { 0 };
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "NOW {:?} harmful {harmful}",
+                    active.iter().map(|e| &self.candidates[e.candidate].effect).collect::<Vec<_>>()
+                );
+            }
             match harmful {
                 0 => sound.clone_from(&active),
                 1 => {}
@@ -283,32 +350,24 @@ impl Search<'_> {
 
     /// The effect to be taken in next.
     fn next(&self, active: &[Active]) -> Option<Active> {
-        let space = self.beside(active, None);
+        let space = self.ground(active, None);
         let rivals = self.rivals(active);
         let before = self.leftover(&space);
         let is_chance = |r: &Rival| r.weight <= ENTER * if self.is_tone(r) { before.band } else { 1.0 };
         let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
         let best = worthy.find(|r| !is_chance(r) && !self.repeats(r, active))?;
-        if best.score.gain < self.shape_error(best, active) || 2.0 * best.score.gain < WORTH * before.energy {
+        let shares = self.shares(active);
+        let least = match shares.is_misshapen(active.len()) {
+            true => HIDDEN * shares.shapes,
+            false => WORTH * before.energy,
+        };
+        if best.score.gain < self.shape_error(best, active) || 2.0 * best.score.gain < least {
             return None;
         }
         let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
         let entered = Active { near, ..self.enter(best, &space)? };
-        let left = self.leftover(&space.with(&entered.columns).with(&entered.shape));
+        let left = self.leftover(&space.with(&entered.columns).with(&entered.state).with(&entered.shape));
         (best.weight >= ENTER * (left.heat / self.heat).max(1.0)).then_some(entered)
-    }
-
-    /// Where the shapes of what was found depart too far from the families', the effect that is most of what they hide.
-    fn beneath_shapes(&self, active: &[Active]) -> Option<Active> {
-        let shares = self.shares(active);
-        if !shares.is_misshapen(active) {
-            return None;
-        }
-        let space = self.beside_names(active);
-        let rivals = self.compare(&space, None);
-        let best = rivals.first().filter(|r| r.weight > ENTER && 2.0 * r.score.gain > HIDDEN * shares.shapes)?;
-        let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
-        Some(Active { near, ..self.enter(best, &space)? })
     }
 
     /// What becomes of the energy that geometry leaves over.
@@ -338,13 +397,19 @@ impl Search<'_> {
         active.iter().any(|a| rival.score.gain < REPEATED * a.score.gain && alike(a))
     }
 
-    /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place.
+    /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place and where
+    /// both go by the clock.
     fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
-        let share = |effect: &Active| match place(effect.candidate) == place(rival.candidate) {
-            true => OWN_SHAPE,
-            false if self.is_tone(rival) => TONE,
-            false => OTHER_SHAPE,
+        let timed = |candidate: usize| self.candidates[candidate].features.iter().any(|f| f.needs_time());
+        let share = |effect: &Active| {
+            if place(effect.candidate) == place(rival.candidate) {
+                OWN_SHAPE
+            } else if self.is_tone(rival) || timed(effect.candidate) && timed(rival.candidate) {
+                CLOCK_SHAPE
+            } else {
+                OTHER_SHAPE
+            }
         };
         active.iter().map(|effect| share(effect) * effect.score.gain).sum()
     }
@@ -356,22 +421,26 @@ impl Search<'_> {
             let mut i = 0;
             while i < active.len() {
                 let rivals = self.rivals_of(active, i);
-                match rivals.first().filter(|r| r.weight > ENTER) {
-                    None => {
-                        active.remove(i);
-                        changed = true;
-                        continue;
-                    }
-                    Some(best) => {
-                        let better = best.candidate != active[i].candidate
-                            || best.score.gain > active[i].score.gain + 0.5;
-                        if let Some(entered) =
-                            self.enter(best, &self.beside(active, Some(i))).filter(|_| better)
-                        {
-                            changed = true;
-                            active[i] = Active { near: std::mem::take(&mut active[i].near), ..entered };
-                        }
-                    }
+                let others: Vec<Active> =
+                    active.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, e)| e.clone()).collect();
+                let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
+                let Some(best) = worthy.find(|r| !self.repeats(r, &others)) else {
+                    active.remove(i);
+                    changed = true;
+                    continue;
+                };
+                // What it was worth when it was taken in counts no longer: the others have changed.
+                let ground = self.ground(active, Some(i));
+                let own = &active[i];
+                let candidate = &self.candidates[own.candidate];
+                let field = self.rows.field(ground.clone());
+                let now = self.rows.score_at(candidate, &own.score.parameters, &field, self.heat);
+                let now =
+                    now.filter(|now| best.candidate == own.candidate && best.score.gain <= now.gain + 0.5);
+                changed |= now.is_none();
+                let rival = now.map(|score| Rival { candidate: own.candidate, weight: best.weight, score });
+                if let Some(entered) = self.enter(rival.as_ref().unwrap_or(best), &ground) {
+                    active[i] = Active { near: std::mem::take(&mut active[i].near), ..entered };
                 }
                 i += 1;
             }

@@ -21,25 +21,63 @@ const CURVE: usize = 12;
 const WANDER: usize = 3;
 /// Travel over which something decays after a reversal, as parts of the range of travel.
 const DECAYS: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
+/// The same for what is remembered of the time before a recording.
+const EARLY: [f64; 3] = [0.003, 0.01, 0.03];
 /// Effects with more directions keep the mixture of them that was found.
 const MOST_DIRECTIONS: usize = 3;
 
 /// Whitened columns of the shape of an effect, each times what its coefficient may be.
 pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
-    let n = rows.residual.len();
-    let amplitude = (&active.columns * &active.solution).norm();
     let curves = curves(rows, candidate, &active.score.parameters);
-    let answers = answers(rows, candidate, active);
+    whitened(rows, &answers(rows, candidate, active), &curves, PART * amplitude(active))
+}
+
+/// Whitened columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
+/// recording, nobody knows from which side it came nor how far. As large as the effect itself.
+pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
+    let stretches = &rows.linear.samples;
+    let mut curves: Vec<Vec<f64>> = Vec::new();
+    for j in candidate.features.iter().filter(|f| f.needs_history()).flat_map(Feature::joints) {
+        let since = column(stretches, j, |c| &c.since_reversal);
+        let travelled = column(stretches, j, |c| &c.travelled);
+        let range = extent(&column(stretches, j, |c| &c.position));
+        let mut first = 0;
+        for stretch in stretches {
+            let own = first..first + stretch.len;
+            first = own.end;
+            let before = |part: f64| -> Vec<f64> {
+                let unknown = |k: &usize| own.contains(k) && since[*k] >= UNKNOWN;
+                let decay = |k: usize| (-travelled[k] / (part * range)).exp();
+                (0..since.len()).map(|k| if unknown(&k) { decay(k) } else { 0.0 }).collect()
+            };
+            let stands_still = travelled[own.clone()].iter().all(|x| *x < EARLY[0] * range);
+            match stands_still {
+                true => curves.push(before(1.0)),
+                false => curves.extend(EARLY.map(before)),
+            }
+        }
+    }
+    whitened(rows, &answers(rows, candidate, active), &curves, amplitude(active))
+}
+
+/// Norm of what an effect does to the whitened rows.
+fn amplitude(active: &Active) -> f64 {
+    (&active.columns * &active.solution).norm()
+}
+
+/// Whitened columns of answers times curves, each of this norm.
+fn whitened(rows: &Rows, answers: &[Vec<f64>], curves: &[Vec<f64>], amplitude: f64) -> DMatrix<f64> {
+    let n = rows.residual.len();
     let mut columns = Vec::new();
     let mut white = vec![0.0; n];
-    for answer in &answers {
-        for curve in &curves {
+    for answer in answers {
+        for curve in curves {
             let column: Vec<f64> =
                 answer.iter().zip(&rows.linear.sample).map(|(a, sample)| a * curve[*sample]).collect();
             rows.whitener.apply(&column, &mut white);
             let length = white.iter().map(|x| x * x).sum::<f64>().sqrt();
             if length > 0.0 && length.is_finite() {
-                columns.push(DVector::from_column_slice(&white) * (PART * amplitude / length));
+                columns.push(DVector::from_column_slice(&white) * (amplitude / length));
             }
         }
     }
@@ -99,6 +137,9 @@ fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>>
     }
     vec![mixture]
 }
+
+/// Distance since a reversal that nobody has seen, m or rad.
+const UNKNOWN: f64 = 1e5;
 
 /// Other functions of what the effect's features depend on, at every sample.
 fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64>> {
@@ -164,17 +205,6 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64
                 let since = column(stretches, *j, |c| &c.since_reversal);
                 let range = extent(&column(stretches, *j, |c| &c.position));
                 curves.extend((0..=4).map(|n| product(&direction, &chebyshev(n, &position))));
-                // In a recording in which it stands still nobody knows on which side it lies.
-                let mut first = 0;
-                for stretch in stretches {
-                    let own = first..first + stretch.len;
-                    if stretch.len > 0 && direction[own.clone()].iter().all(|d| *d == 0.0) {
-                        curves.push(
-                            (0..direction.len()).map(|k| if own.contains(&k) { 1.0 } else { 0.0 }).collect(),
-                        );
-                    }
-                    first = own.end;
-                }
                 for part in DECAYS {
                     let decay: Vec<f64> =
                         since.iter().map(|s| (-s / (part * range)).max(-200.0).exp()).collect();
