@@ -110,6 +110,7 @@ pub fn diagnose(
             active = told(&search, &search.run(&active));
             return Ok(finding::report(&search, &active, machine, library, &noise));
         }
+        if std::env::var("DBG").is_ok() { eprintln!("NOISE {:?}", judged.first()); }
         noise = judged;
     }
     unreachable!("the last round reports")

@@ -169,6 +169,8 @@ const SURPRISE: f64 = 0.003;
 const CHANCE: f64 = 5.0;
 /// Names of which the data say less than this against the best are listed with it.
 const LISTED: f64 = 0.05;
+/// Where shapes make up less than this part of all, the names are no patches, whatever surprises.
+const ODD_SHAPE: f64 = 0.05;
 /// How often the true shape of an effect is none of its family's, and the part of its energy by which that may shift the odds of other
 /// names for the same place.
 const UNSURE: f64 = 0.2;
@@ -213,7 +215,7 @@ pub(super) fn report(
     let memory = noise.iter().map(|n| (1.0 + n.rho) / (1.0 - n.rho)).fold(1.0, f64::max);
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
         || shares.is_misshapen(active.len())
-        || surprise > CHANCE * left.heat.max(1.0) * deviation && surprise > SURPRISE * memory * total;
+        || shares.shapes > ODD_SHAPE * total && surprise > CHANCE * left.heat.max(1.0) * deviation && surprise > SURPRISE * memory * total;
     let noise_of = |angle: bool| {
         let own = search
             .runs

@@ -80,6 +80,8 @@ const PARABOLAS: usize = 3;
 const HALVINGS: usize = 9;
 /// Effects of more energy (half of it) than this show their shape; of rivals with this part of the best one's, so many are looked at.
 const LARGE: f64 = 300.0;
+/// Fewer rows show no shape.
+const MANY: usize = 500;
 const SIMILAR: f64 = 0.8;
 const SHAPED: usize = 8;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
@@ -184,7 +186,7 @@ impl Search<'_> {
                 }
             }
         }
-        if most > LARGE {
+        if most > LARGE && rows.whitener.count() > MANY {
             let alike: Vec<usize> =
                 (0..close).filter(|i| rivals[*i].score.gain > SIMILAR * most).take(SHAPED).collect();
             for i in alike {
@@ -370,13 +372,16 @@ impl Search<'_> {
         (best.weight >= ENTER * (left.heat / self.heat).max(1.0)).then_some(entered)
     }
 
-    /// What becomes of the energy that geometry leaves over.
+    /// What becomes of the energy that geometry leaves over, what chance would take not counted.
     pub fn shares(&self, active: &[Active]) -> Shares {
         let (names, full) = (self.beside_names(active), self.beside(active, None));
         let energy = |space: &Space| self.rows.residual.dot(&space.apply(&self.rows.residual));
+        let taken = |from: &Space, to: &Space| {
+            (energy(from) - energy(to) - (to.parameters() - from.parameters())).max(0.0)
+        };
         Shares {
-            names: (energy(&self.base) - energy(&names)).max(0.0),
-            shapes: (energy(&names) - energy(&full)).max(0.0),
+            names: taken(&self.base, &names),
+            shapes: taken(&names, &full),
             left: self.leftover(&full),
         }
     }

@@ -72,6 +72,11 @@ impl Space {
             - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
     }
 
+    /// How many parameters it stands for, as far as the rows determine them: the trace of `I - M`.
+    pub fn parameters(&self) -> f64 {
+        self.w.norm_squared()
+    }
+
     /// `M x`.
     pub fn apply(&self, x: &DVector<f64>) -> DVector<f64> {
         let along = self.w.tr_mul(x);
