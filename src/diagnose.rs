@@ -53,6 +53,9 @@ const NOISE_ROUNDS: usize = 3;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
 
+/// An effect without which the mean square of stretches left out falls by this factor runs wild there, whatever else speaks for it.
+const WILD: f64 = 2.0;
+
 /// Diagnoses what constant geometry leaves over in these recordings.
 ///
 /// # Errors
@@ -76,10 +79,15 @@ pub fn diagnose(
     }
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
+    let met =
+        |effect: &str| candidates.all.iter().filter(|c| c.effect == effect).map(|c| c.often).sum::<f64>();
+    let most_met = candidates.all.iter().map(|c| met(&c.effect)).fold(f64::MIN_POSITIVE, f64::max);
+    let commonness: Vec<f64> = candidates.all.iter().map(|c| (met(&c.effect) / most_met).ln()).collect();
 
-    let told = |search: &Search, active: &[Active]| match !facts_are_smooth(&facts) && !facts.approached {
-        true => folds::useful(search, active),
-        false => active.to_vec(),
+    // Nothing tells the noise of few settled positions but what is left of them, so every effect has to prove itself.
+    let is_sure = facts_are_smooth(&facts) || facts.approached;
+    let told = |search: &Search, active: &[Active], is_sure: bool| {
+        folds::useful(search, active, if is_sure { WILD } else { 1.0 })
     };
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
     let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
@@ -93,8 +101,10 @@ pub fn diagnose(
             base: rows.constant(),
             candidates: &candidates.all,
             priors: priors.clone(),
+            commonness: commonness.clone(),
             progress,
             heat: 1.0,
+            in_motion: facts_are_smooth(&facts),
             known: RefCell::default(),
         };
         active = search.run(&active);
@@ -102,15 +112,14 @@ pub fn diagnose(
         if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
             let heat = search.leftover(&search.beside(&active, None)).heat;
             if heat < HOT {
-                let active = told(&search, &active);
+                let active = told(&search, &active, is_sure);
                 return Ok(finding::report(&search, &active, machine, library, &noise));
             }
             // Much is left, as it always is on real machines: the simplest names that stand out from it count.
             let search = Search { heat, known: RefCell::default(), ..search };
-            active = told(&search, &search.run(&active));
+            active = told(&search, &search.run(&active), is_sure);
             return Ok(finding::report(&search, &active, machine, library, &noise));
         }
-        if std::env::var("DBG").is_ok() { eprintln!("NOISE {:?}", judged.first()); }
         noise = judged;
     }
     unreachable!("the last round reports")

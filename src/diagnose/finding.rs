@@ -198,24 +198,12 @@ pub(super) fn report(
     let shares = search.shares(active);
     let (left, total) = (&shares.left, shares.total());
     let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
-    if std::env::var("DBG").is_ok() {
-        eprintln!(
-            "DBG surprise {:.1} {:.4} names {:.1} shapes {:.1} left {:.1} total {total:.1} shaped {:?}",
-            surprise / deviation,
-            surprise / total,
-            shares.names,
-            shares.shapes,
-            left.energy,
-            active
-                .iter()
-                .map(|e| (&search.candidates[e.candidate].effect, e.shape.ncols()))
-                .collect::<Vec<_>>()
-        );
-    }
     let memory = noise.iter().map(|n| (1.0 + n.rho) / (1.0 - n.rho)).fold(1.0, f64::max);
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
         || shares.is_misshapen(active.len())
-        || shares.shapes > ODD_SHAPE * total && surprise > CHANCE * left.heat.max(1.0) * deviation && surprise > SURPRISE * memory * total;
+        || shares.shapes > ODD_SHAPE * total
+            && surprise > CHANCE * left.heat.max(1.0) * deviation
+            && surprise > SURPRISE * memory * total;
     let noise_of = |angle: bool| {
         let own = search
             .runs
@@ -236,7 +224,8 @@ pub(super) fn report(
             continue;
         }
         let odds = odds(search, &rivals, own);
-        let probability = odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
+        let probability =
+            odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
         let candidate = &search.candidates[effect.candidate];
         let family = &library.families()[candidate.family];
         let solved = model.effect(search, active, i);
@@ -363,8 +352,7 @@ fn odds<'a>(search: &Search, rivals: &'a [Rival], own: &Rival) -> Vec<(&'a Rival
     let (all, all_alike) =
         (rivals.iter().map(plain).sum::<f64>() + nothing, rivals.iter().map(shifted).sum::<f64>());
     let beside = rivals.iter().filter(|r| place(r) == place(own)).map(plain).sum::<f64>() / all;
-    let probability =
-        |r: &Rival| (1.0 - UNSURE) * plain(r) / all + UNSURE * beside * shifted(r) / all_alike;
+    let probability = |r: &Rival| (1.0 - UNSURE) * plain(r) / all + UNSURE * beside * shifted(r) / all_alike;
     let listed = |r: &Rival| probability(r) > LISTED * probability(own) || shifted(r) > ALIKE;
     rivals.iter().map(|r| (r, probability(r), r.candidate != own.candidate && listed(r))).collect()
 }

@@ -89,7 +89,12 @@ impl Normal {
                 owner.extend(vec![Some(i); own.ncols()]);
             }
         }
-        Some(Normal { folds: grams(&white, &rows.residual, &fold_of), owner })
+        let mut folds = grams(&white, &rows.residual, &fold_of);
+        for (gram, b) in &mut folds {
+            *gram /= search.heat;
+            *b /= search.heat;
+        }
+        Some(Normal { folds, owner })
     }
 
     /// The sum over all folds but one, with the prior.
@@ -148,12 +153,12 @@ fn grams(
     (0..FOLDS).map(one).collect()
 }
 
-/// What predicts stretches that were left out no worse: effects that make them worse go, the worst first. For few settled positions,
-/// of which nothing tells the noise but what is left of them.
-pub(super) fn useful(search: &Search, active: &[Active]) -> Vec<Active> {
+/// What predicts stretches that were left out no worse: effects without which their mean square would fall by more than this factor
+/// go, the worst first.
+pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Active> {
     let mut kept = active.to_vec();
     while let Some(folds) = Folds::new(search, &kept) {
-        let better = folds.without_each(search, &kept).into_iter().enumerate().filter(|(_, b)| *b > 1.0);
+        let better = folds.without_each(search, &kept).into_iter().enumerate().filter(|(_, b)| *b > factor);
         let Some((worst, _)) = better.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
         kept.remove(worst);
     }

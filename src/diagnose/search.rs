@@ -56,9 +56,13 @@ pub(super) struct Search<'a> {
     pub candidates: &'a [Candidate],
     /// Logarithm of what is expected of each candidate beforehand.
     pub priors: Vec<f64>,
+    /// Logarithm of how often its family is met at all, the most frequent 0.
+    pub commonness: Vec<f64>,
     pub progress: &'a dyn Fn(&str),
     /// By how much chance counts as larger than the noise says.
     pub heat: f64,
+    /// Whether the recordings follow a path; else they are settled positions, of which the side of approach is known.
+    pub in_motion: bool,
     /// Rivals that are known, by what has been taken in besides.
     pub known: RefCell<Known>,
 }
@@ -80,20 +84,22 @@ const PARABOLAS: usize = 3;
 const HALVINGS: usize = 9;
 /// Effects of more energy (half of it) than this show their shape; of rivals with this part of the best one's, so many are looked at.
 const LARGE: f64 = 300.0;
-/// Fewer rows show no shape.
+/// By this part of the best one's energy no rival is better than a more common one: what comes so close is a matter of shape.
+const UNKNOWN_SHAPE: f64 = 0.002;
+/// Fewer rows show no shape and foretell nothing.
 const MANY: usize = 500;
 const SIMILAR: f64 = 0.8;
 const SHAPED: usize = 8;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
-const OWN_SHAPE: f64 = 0.01;
-const OTHER_SHAPE: f64 = 0.003;
+const OWN_SHAPE: f64 = 0.004;
+const OTHER_SHAPE: f64 = 0.002;
 /// A tone is heard in the edges of every other shape, and one course over time in another.
 const CLOCK_SHAPE: f64 = 0.01;
 /// A second line of the same family at the same place takes away at least this part of what the first does.
 const REPEATED: f64 = 0.15;
-/// The shapes of what was found may make up this part of all; less, the more names share it.
+/// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
 const SHAPE: f64 = 0.35;
 /// An effect that was taken for the shape of another is at least this part of it.
 const HIDDEN: f64 = 0.8;
@@ -121,7 +127,7 @@ impl Shares {
     /// Whether the shapes depart so far from the families' that the names are wrong.
     pub fn is_misshapen(&self, effects: usize) -> bool {
         let several = effects.max(2) - 1;
-        self.shapes > SHAPE * self.total() / several as f64
+        self.shapes > SHAPE * self.total() / (several as f64).sqrt()
     }
 }
 
@@ -174,23 +180,14 @@ impl Search<'_> {
         rivals.sort_by(better_first);
         // No play is quite a step: what explains nearly as much may do so better once its shape may depart a little from the family's.
         let most = rivals.first().map_or(0.0, |best| best.score.gain);
-        if std::env::var("DBG").is_ok() {
-            eprintln!(" among {:?}", among.map(|a| a.len()));
-            for (k, r) in rivals.iter().enumerate() {
-                let n = &candidates[r.candidate].effect;
-                if k < 12 || (k < 120 && n.contains("drift")) {
-                    eprintln!(
-                        "  RIV {k} {n} {:?} w {:.0} g {:.0} {:?}",
-                        candidates[r.candidate].place, r.weight, r.score.gain, r.score.parameters
-                    );
-                }
-            }
-        }
         if most > LARGE && rows.whitener.count() > MANY {
             let alike: Vec<usize> =
                 (0..close).filter(|i| rivals[*i].score.gain > SIMILAR * most).take(SHAPED).collect();
             for i in alike {
                 rivals[i].weight = self.with_shape(&rivals[i], &field);
+            }
+            for rival in &mut rivals[..close] {
+                rival.weight += UNKNOWN_SHAPE * most * self.commonness[rival.candidate];
             }
             rivals.sort_by(better_first);
         }
@@ -208,24 +205,6 @@ impl Search<'_> {
         };
         let by_shape = field.space.worth(&effect.state, &field.left, self.heat)
             + with_state.space.worth(&effect.shape, &with_state.left, self.heat);
-        if std::env::var("DBG").is_ok() {
-            let r = &self.rows.residual;
-            let e = |s: &Space| r.dot(&s.apply(r));
-            let n = field.space.with(&effect.columns).with(&effect.state);
-            let f = n.with(&effect.shape);
-            eprintln!(
-                "SHP {} {:?} weight {:.0} plain {:.0} total {:.0} names {:.0} shapes {:.0} left {:.0} / {}",
-                candidate.effect,
-                candidate.place,
-                rival.weight + by_shape + score.at_best - rival.score.at_best,
-                rival.weight,
-                e(&field.space),
-                e(&field.space) - e(&n),
-                e(&n) - e(&f),
-                e(&f),
-                self.rows.whitener.count()
-            );
-        }
         let weight = rival.weight + by_shape + score.at_best - rival.score.at_best;
         log_mean_exp(&[rival.weight, weight])
     }
@@ -285,7 +264,9 @@ impl Search<'_> {
         let (state, shape) = (none.clone(), none);
         let mut effect =
             Active { candidate: rival.candidate, score, columns, solution, state, shape, near: Vec::new() };
-        effect.state = shape::states(self.rows, candidate, &effect);
+        if self.in_motion {
+            effect.state = shape::states(self.rows, candidate, &effect);
+        }
         effect.shape = shape::columns(self.rows, candidate, &effect);
         Some(effect)
     }
@@ -321,32 +302,20 @@ impl Search<'_> {
             }
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let Some(entered) = self.next(&active) else { break };
-            if std::env::var("DBG").is_ok() {
-                eprintln!(
-                    "ENTER {} {:?} g {:.0}",
-                    self.candidates[entered.candidate].effect,
-                    self.candidates[entered.candidate].place,
-                    entered.score.gain
-                );
-            }
             active.push(entered);
             if active.len() > 1 {
                 self.swap(&mut active);
             }
             // A name that makes stretches worse that were left out is a patch, unless the next one mends it.
-            harmful = if folds::harmful(self, &active).is_some() { harmful + 1 } else { 0 };
-            if std::env::var("DBG").is_ok() {
-                eprintln!(
-                    "NOW {:?} harmful {harmful}",
-                    active.iter().map(|e| &self.candidates[e.candidate].effect).collect::<Vec<_>>()
-                );
-            }
+            let is_patched = self.rows.whitener.count() > MANY && folds::harmful(self, &active).is_some();
+            harmful = if is_patched { harmful + 1 } else { 0 };
             match harmful {
                 0 => sound.clone_from(&active),
                 1 => {}
                 _ => break,
             }
         }
+        self.swap(&mut sound);
         sound
     }
 
@@ -379,11 +348,7 @@ impl Search<'_> {
         let taken = |from: &Space, to: &Space| {
             (energy(from) - energy(to) - (to.parameters() - from.parameters())).max(0.0)
         };
-        Shares {
-            names: taken(&self.base, &names),
-            shapes: taken(&names, &full),
-            left: self.leftover(&full),
-        }
+        Shares { names: taken(&self.base, &names), shapes: taken(&names, &full), left: self.leftover(&full) }
     }
 
     /// Whether it is a wave in time: noise whose colour is not quite known has many.
