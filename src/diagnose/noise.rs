@@ -123,8 +123,9 @@ pub(super) fn waiting(linear: &Linear) -> Vec<bool> {
             joint.position.iter().position(|q| (q - start).abs() > STILL * far)
         });
         let still = moved.min().filter(|still| 2 * still < samples.len).unwrap_or(0);
-        for row in span.rows.0..span.rows.1 {
-            waiting[row] = linear.sample[row] - span.samples.0 < still.saturating_sub(1);
+        let rows = span.rows.0..span.rows.1;
+        for (waits, sample) in waiting[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
+            *waits = sample - span.samples.0 < still.saturating_sub(1);
         }
     }
     waiting
