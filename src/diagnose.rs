@@ -30,8 +30,9 @@ pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
 pub use unexplained::{Gathering, Unexplained};
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 
-use crate::effects::{Library, RecordingFacts};
+use crate::effects::{Candidate, Library, RecordingFacts};
 use crate::error::Result;
 use crate::identify::{Linear, Options, linear};
 use crate::machine::Machine;
@@ -39,7 +40,7 @@ use crate::recording::Recording;
 use coarse::Coarse;
 use noise::{Noise, Whitener};
 use score::Rows;
-use search::{Active, Search};
+use search::Search;
 
 /// What a diagnosis is asked.
 #[derive(Clone, Debug, Default)]
@@ -52,7 +53,6 @@ pub struct Request {
 const NOISE_ROUNDS: usize = 3;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
-
 /// An effect without which the mean square of stretches left out falls by this factor runs wild there, whatever else speaks for it.
 const WILD: f64 = 2.0;
 
@@ -79,16 +79,9 @@ pub fn diagnose(
     }
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
-    let met =
-        |effect: &str| candidates.all.iter().filter(|c| c.effect == effect).map(|c| c.often).sum::<f64>();
-    let most_met = candidates.all.iter().map(|c| met(&c.effect)).fold(f64::MIN_POSITIVE, f64::max);
-    let commonness: Vec<f64> = candidates.all.iter().map(|c| (met(&c.effect) / most_met).ln()).collect();
-
+    let commonness = commonness(&candidates.all);
     // Nothing tells the noise of few settled positions but what is left of them, so every effect has to prove itself.
-    let is_sure = facts_are_smooth(&facts) || facts.approached;
-    let told = |search: &Search, active: &[Active], is_sure: bool| {
-        folds::useful(search, active, if is_sure { WILD } else { 1.0 })
-    };
+    let most_wild = if facts_are_smooth(&facts) || facts.approached { WILD } else { 1.0 };
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
     let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
     let mut active = Vec::new();
@@ -112,17 +105,30 @@ pub fn diagnose(
         if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
             let heat = search.leftover(&search.beside(&active, None)).heat;
             if heat < HOT {
-                let active = told(&search, &active, is_sure);
+                let active = folds::useful(&search, &active, most_wild);
                 return Ok(finding::report(&search, &active, machine, library, &noise));
             }
             // Much is left, as it always is on real machines: the simplest names that stand out from it count.
             let search = Search { heat, known: RefCell::default(), ..search };
-            active = told(&search, &search.run(&active), is_sure);
+            active = folds::useful(&search, &search.run(&active), most_wild);
             return Ok(finding::report(&search, &active, machine, library, &noise));
         }
         noise = judged;
     }
     unreachable!("the last round reports")
+}
+
+/// Families that are met more often than this part of the most frequent one are common.
+const COMMON: f64 = 0.2;
+
+/// How rare the family of each candidate is: the logarithm of how often it is met, 0 for all common ones.
+fn commonness(candidates: &[Candidate]) -> Vec<f64> {
+    let mut met: HashMap<&str, f64> = HashMap::new();
+    for candidate in candidates {
+        *met.entry(&candidate.effect).or_default() += candidate.often;
+    }
+    let most = met.values().copied().fold(f64::MIN_POSITIVE, f64::max);
+    candidates.iter().map(|c| (met[c.effect.as_str()] / (COMMON * most)).min(1.0).ln()).collect()
 }
 
 fn facts_are_smooth(facts: &RecordingFacts) -> bool {

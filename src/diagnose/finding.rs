@@ -7,7 +7,7 @@ use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
 use super::outliers::{self, Outliers, WithoutOutliers};
-use super::search::{Active, Rival, Search};
+use super::search::{Active, Rival, Search, VISIBLE};
 use super::stretch::{Where, wheres};
 use super::traces::{self, Traces};
 use super::unexplained::{self, Unexplained};
@@ -174,9 +174,11 @@ const ODD_SHAPE: f64 = 0.05;
 /// How often the true shape of an effect is none of its family's, and the part of its energy by which that may shift the odds of other
 /// names for the same place.
 const UNSURE: f64 = 0.2;
-const SHIFT: f64 = 0.006;
+const SHIFT: f64 = 0.003;
 /// Names that are so likely besides the best one, as their weights may shift, are listed too.
 const ALIKE: f64 = 0.15;
+/// But no names that are so much rarer, as a logarithm.
+const RARER: f64 = 1.2;
 /// Logarithm of the odds at which a finding is told.
 const TOLD: f64 = 5.0;
 
@@ -217,13 +219,16 @@ pub(super) fn report(
     let model = Model::new(search, active);
     for (i, effect) in active.iter().enumerate() {
         let rivals = search.rivals_of(active, i);
-        let rivals: Vec<Rival> = rivals.iter().map(|r| search.tempered(r, left.heat)).collect();
+        let others: Vec<Active> =
+            active.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, other)| other.clone()).collect();
+        let fit = |r: &&Rival| r.candidate == effect.candidate || !search.repeats(r, &others);
+        let rivals: Vec<Rival> = rivals.iter().filter(fit).map(|r| search.tempered(r, left.heat)).collect();
         let own = rivals.iter().find(|r| r.candidate == effect.candidate);
         let Some(own) = own.filter(|r| r.weight > TOLD) else { continue };
         if is_unexplained {
             continue;
         }
-        let odds = odds(search, &rivals, own);
+        let odds = odds(search, &rivals, own, left.heat.max(search.heat));
         let probability =
             odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
         let candidate = &search.candidates[effect.candidate];
@@ -338,12 +343,13 @@ pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f
 }
 
 /// Probability of every rival, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.
-/// With each whether it is listed.
-fn odds<'a>(search: &Search, rivals: &'a [Rival], own: &Rival) -> Vec<(&'a Rival, f64, bool)> {
+/// With each whether it is listed; `heat`: that of the weights.
+fn odds<'a>(search: &Search, rivals: &'a [Rival], own: &Rival, heat: f64) -> Vec<(&'a Rival, f64, bool)> {
     let place = |r: &Rival| search.candidates[r.candidate].place;
     let effect = |r: &Rival| &search.candidates[r.candidate].effect;
     let plain = |r: &Rival| (r.weight - own.weight).exp();
-    let shift = 1.0 + SHIFT * own.score.gain;
+    let visible = VISIBLE * search.rows.whitener.count() as f64;
+    let shift = 1.0 + (SHIFT * own.score.gain).min(visible) / heat;
     let shifted = |r: &Rival| {
         let is_alike = place(r) == place(own) && (effect(r) != effect(own) || r.candidate == own.candidate);
         if is_alike { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
@@ -353,7 +359,8 @@ fn odds<'a>(search: &Search, rivals: &'a [Rival], own: &Rival) -> Vec<(&'a Rival
         (rivals.iter().map(plain).sum::<f64>() + nothing, rivals.iter().map(shifted).sum::<f64>());
     let beside = rivals.iter().filter(|r| place(r) == place(own)).map(plain).sum::<f64>() / all;
     let probability = |r: &Rival| (1.0 - UNSURE) * plain(r) / all + UNSURE * beside * shifted(r) / all_alike;
-    let listed = |r: &Rival| probability(r) > LISTED * probability(own) || shifted(r) > ALIKE;
+    let is_common = |r: &Rival| search.commonness[r.candidate] > search.commonness[own.candidate] - RARER;
+    let listed = |r: &Rival| probability(r) > LISTED * probability(own) || shifted(r) > ALIKE && is_common(r);
     rivals.iter().map(|r| (r, probability(r), r.candidate != own.candidate && listed(r))).collect()
 }
 

@@ -56,7 +56,7 @@ pub(super) struct Search<'a> {
     pub candidates: &'a [Candidate],
     /// Logarithm of what is expected of each candidate beforehand.
     pub priors: Vec<f64>,
-    /// Logarithm of how often its family is met at all, the most frequent 0.
+    /// Logarithm of how often its family is met at all, 0 for all that are common.
     pub commonness: Vec<f64>,
     pub progress: &'a dyn Fn(&str),
     /// By how much chance counts as larger than the noise says.
@@ -84,12 +84,14 @@ const PARABOLAS: usize = 3;
 const HALVINGS: usize = 9;
 /// Effects of more energy (half of it) than this show their shape; of rivals with this part of the best one's, so many are looked at.
 const LARGE: f64 = 300.0;
-/// By this part of the best one's energy no rival is better than a more common one: what comes so close is a matter of shape.
-const UNKNOWN_SHAPE: f64 = 0.002;
-/// Fewer rows show no shape and foretell nothing.
-const MANY: usize = 500;
 const SIMILAR: f64 = 0.8;
 const SHAPED: usize = 8;
+/// What comes within this part of the best one's energy is a matter of shape, and the more common name is to be preferred.
+const UNKNOWN_SHAPE: f64 = 0.002;
+/// But not where it leaves so much more than the noise, as part of it, that anybody would see.
+pub(super) const VISIBLE: f64 = 0.02;
+/// Fewer rows show no shape and foretell nothing.
+const MANY: usize = 500;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
@@ -179,15 +181,16 @@ impl Search<'_> {
         rivals.splice(..close, refined);
         rivals.sort_by(better_first);
         // No play is quite a step: what explains nearly as much may do so better once its shape may depart a little from the family's.
-        let most = rivals.first().map_or(0.0, |best| best.score.gain);
+        let most = rivals.first().map_or(0.0, |best| best.score.gain / heat);
         if most > LARGE && rows.whitener.count() > MANY {
             let alike: Vec<usize> =
-                (0..close).filter(|i| rivals[*i].score.gain > SIMILAR * most).take(SHAPED).collect();
+                (0..close).filter(|i| rivals[*i].score.gain / heat > SIMILAR * most).take(SHAPED).collect();
             for i in alike {
                 rivals[i].weight = self.with_shape(&rivals[i], &field);
             }
+            let slack = (UNKNOWN_SHAPE * most).min(VISIBLE * rows.whitener.count() as f64 / heat);
             for rival in &mut rivals[..close] {
-                rival.weight += UNKNOWN_SHAPE * most * self.commonness[rival.candidate];
+                rival.weight += slack * self.commonness[rival.candidate];
             }
             rivals.sort_by(better_first);
         }
@@ -358,7 +361,7 @@ impl Search<'_> {
 
     /// Whether it is little beside what was found already at its place and has its name, or is another shape along the travel where
     /// a curve was found: that is its shape.
-    fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
+    pub fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
         let of = |candidate: usize| (&self.candidates[candidate].effect, self.candidates[candidate].place);
         let alike = |a: &Active| {
             of(a.candidate) == of(rival.candidate)
