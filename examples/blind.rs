@@ -160,7 +160,7 @@ fn report(arguments: &Arguments) -> Result<String, String> {
     let folder = std::env::temp_dir().join(format!("kincal-blind-report-{}", std::process::id()));
     let engine = engine(arguments)?;
     let (count, seed) = (arguments.count, arguments.seed);
-    let mut out = String::from("## Blind cases\n\n");
+    let mut out = String::new();
     let _ = writeln!(
         out,
         "Written by `cargo run --release --example blind -- --report docs/diagnosis.md --count {count} --seed {seed}`.\n"

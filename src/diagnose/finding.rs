@@ -174,9 +174,11 @@ const ODD_SHAPE: f64 = 0.05;
 /// How often the true shape of an effect is none of its family's, and the part of its energy by which that may shift the odds of other
 /// names for the same place.
 const UNSURE: f64 = 0.2;
-const SHIFT: f64 = 0.003;
+const SHIFT: f64 = 0.002;
 /// Names that are so likely besides the best one, as their weights may shift, are listed too.
-const ALIKE: f64 = 0.15;
+const ALIKE: f64 = 0.12;
+/// A common effect of which the shape is less than this part of all is what it looks like.
+const PLAIN: f64 = 0.01;
 /// But no names that are so much rarer, as a logarithm.
 const RARER: f64 = 1.2;
 /// Logarithm of the odds at which a finding is told.
@@ -228,7 +230,8 @@ pub(super) fn report(
         if is_unexplained {
             continue;
         }
-        let odds = odds(search, &rivals, own, left.heat.max(search.heat));
+        let is_plain = search.commonness[own.candidate] == 0.0 && shares.shapes < PLAIN * total;
+        let odds = odds(search, &rivals, own, left.heat.max(search.heat), is_plain);
         let probability =
             odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
         let candidate = &search.candidates[effect.candidate];
@@ -343,8 +346,15 @@ pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f
 }
 
 /// Probability of every rival, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.
-/// With each whether it is listed; `heat`: that of the weights.
-fn odds<'a>(search: &Search, rivals: &'a [Rival], own: &Rival, heat: f64) -> Vec<(&'a Rival, f64, bool)> {
+/// With each whether it is listed; `heat`: that of the weights, `is_plain`: a common family in its own shape.
+fn odds<'a>(
+    search: &Search,
+    rivals: &'a [Rival],
+    own: &Rival,
+    heat: f64,
+    is_plain: bool,
+) -> Vec<(&'a Rival, f64, bool)> {
+    let unsure = if is_plain { 0.0 } else { UNSURE };
     let place = |r: &Rival| search.candidates[r.candidate].place;
     let effect = |r: &Rival| &search.candidates[r.candidate].effect;
     let plain = |r: &Rival| (r.weight - own.weight).exp();
@@ -358,9 +368,11 @@ fn odds<'a>(search: &Search, rivals: &'a [Rival], own: &Rival, heat: f64) -> Vec
     let (all, all_alike) =
         (rivals.iter().map(plain).sum::<f64>() + nothing, rivals.iter().map(shifted).sum::<f64>());
     let beside = rivals.iter().filter(|r| place(r) == place(own)).map(plain).sum::<f64>() / all;
-    let probability = |r: &Rival| (1.0 - UNSURE) * plain(r) / all + UNSURE * beside * shifted(r) / all_alike;
+    let probability = |r: &Rival| (1.0 - unsure) * plain(r) / all + unsure * beside * shifted(r) / all_alike;
     let is_common = |r: &Rival| search.commonness[r.candidate] > search.commonness[own.candidate] - RARER;
-    let listed = |r: &Rival| probability(r) > LISTED * probability(own) || shifted(r) > ALIKE && is_common(r);
+    let listed = |r: &Rival| {
+        probability(r) > LISTED * probability(own) || !is_plain && shifted(r) > ALIKE && is_common(r)
+    };
     rivals.iter().map(|r| (r, probability(r), r.candidate != own.candidate && listed(r))).collect()
 }
 
