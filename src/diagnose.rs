@@ -80,8 +80,8 @@ pub fn diagnose(
     let total: f64 = candidates.all.iter().map(|c| c.often).sum();
     let priors: Vec<f64> = candidates.all.iter().map(|c| (c.often / total).ln()).collect();
     let commonness = commonness(&candidates.all);
-    // Nothing tells the noise of few settled positions but what is left of them, so every effect has to prove itself.
-    let most_wild = if facts_are_smooth(&facts) || facts.approached { WILD } else { 1.0 };
+    // Settled positions are few, and where none is repeated nothing tells their noise: every effect has to prove itself.
+    let most_wild = if facts_are_smooth(&facts) { WILD } else { 1.0 };
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
     let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
     let mut active = Vec::new();
