@@ -6,7 +6,7 @@ use super::search::{Active, Search};
 
 /// Constant deviations and effects solved together.
 pub(super) struct Model {
-    /// Whitened: constants, then the columns of each effect.
+    /// Whitened: constants, then of each effect its columns and what it may have been before anybody looked.
     columns: DMatrix<f64>,
     /// First column of each effect.
     offsets: Vec<usize>,
@@ -30,8 +30,11 @@ impl Model {
         for effect in active {
             let at = columns.ncols();
             offsets.push(at);
-            columns = columns.insert_columns(at, effect.columns.ncols(), 0.0);
-            columns.columns_mut(at, effect.columns.ncols()).copy_from(&effect.columns);
+            for own in [&effect.columns, &effect.state] {
+                let at = columns.ncols();
+                columns = columns.insert_columns(at, own.ncols(), 0.0);
+                columns.columns_mut(at, own.ncols()).copy_from(own);
+            }
         }
         let gram = columns.tr_mul(&columns) + DMatrix::identity(columns.ncols(), columns.ncols());
         let covariance =
