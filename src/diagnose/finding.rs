@@ -7,7 +7,7 @@ use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
 use super::outliers::{self, Outliers, WithoutOutliers};
-use super::search::{Active, Rival, Search, VISIBLE};
+use super::search::{Active, Rival, Search, VISIBLE, all_but};
 use super::stretch::{Where, wheres};
 use super::traces::{self, Traces};
 use super::unexplained::{self, Unexplained};
@@ -221,8 +221,7 @@ pub(super) fn report(
     let model = Model::new(search, active);
     for (i, effect) in active.iter().enumerate() {
         let rivals = search.rivals_of(active, i);
-        let others: Vec<Active> =
-            active.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, other)| other.clone()).collect();
+        let others = all_but(active, Some(i));
         let fit = |r: &&Rival| r.candidate == effect.candidate || !search.repeats(r, &others);
         let rivals: Vec<Rival> = rivals.iter().filter(fit).map(|r| search.tempered(r, left.heat)).collect();
         let own = rivals.iter().find(|r| r.candidate == effect.candidate);

@@ -230,12 +230,7 @@ impl Search<'_> {
     /// The space beside all active effects but one, their shapes as the families' where they would depart too far: what is hidden there
     /// is another effect, or unexplained.
     fn ground(&self, active: &[Active], but: Option<usize>) -> Space {
-        let others: Vec<Active> = active
-            .iter()
-            .enumerate()
-            .filter(|(i, _)| Some(*i) != but)
-            .map(|(_, effect)| effect.clone())
-            .collect();
+        let others = all_but(active, but);
         match !others.is_empty() && self.shares(&others).is_misshapen(others.len()) {
             true => self.beside_names(&others),
             false => self.beside(&others, None),
@@ -394,8 +389,7 @@ impl Search<'_> {
             let mut i = 0;
             while i < active.len() {
                 let rivals = self.rivals_of(active, i);
-                let others: Vec<Active> =
-                    active.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, e)| e.clone()).collect();
+                let others = all_but(active, Some(i));
                 let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
                 let Some(best) = worthy.find(|r| !self.repeats(r, &others)) else {
                     active.remove(i);
@@ -422,6 +416,11 @@ impl Search<'_> {
             }
         }
     }
+}
+
+/// All effects but one.
+pub(super) fn all_but(active: &[Active], but: Option<usize>) -> Vec<Active> {
+    active.iter().enumerate().filter(|(i, _)| Some(*i) != but).map(|(_, effect)| effect.clone()).collect()
 }
 
 /// Moves the parameters between the points of the grid to where the evidence is greatest; the evidence over the grid grows alike.
