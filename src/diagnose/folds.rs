@@ -13,11 +13,7 @@ const FOLDS: usize = 5;
 pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) {
     let Some(folds) = Folds::new(search, told) else { return };
     let count = folds.owner.len();
-    let constants = folds.raw.ncols() - told.iter().map(|e| e.columns.ncols()).sum::<usize>();
-    let mut owner: Vec<Option<usize>> = vec![None; constants];
-    for (i, effect) in told.iter().enumerate() {
-        owner.extend(vec![Some(i); effect.columns.ncols()]);
-    }
+    let owner = folds.owners_of_columns(told);
     let with = |takes: &dyn Fn(usize) -> bool| -> Vec<f64> {
         let columns: Vec<usize> = (0..owner.len()).filter(|c| owner[*c].is_none_or(takes)).collect();
         let left = folds.left_out(search, &columns);
@@ -154,13 +150,16 @@ fn grams(
 }
 
 /// What predicts stretches that were left out no worse: effects without which their mean square would fall by more than this factor
-/// go, the worst first.
+/// go, the worst first; and all of them, where together they do no better than geometry alone.
 pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Active> {
     let mut kept = active.to_vec();
     while let Some(folds) = Folds::new(search, &kept) {
         let better = folds.without_each(search, &kept).into_iter().enumerate().filter(|(_, b)| *b > factor);
-        let Some((worst, _)) = better.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
-        kept.remove(worst);
+        match better.max_by(|a, b| a.1.total_cmp(&b.1)) {
+            Some((worst, _)) => drop(kept.remove(worst)),
+            None if folds.without_all(search, &kept) > factor => kept.clear(),
+            None => break,
+        }
     }
     kept
 }
@@ -196,19 +195,32 @@ impl Folds {
 
     /// By which factor the mean square of what is left out grows with each effect beside all others.
     fn without_each(&self, search: &Search, active: &[Active]) -> Vec<f64> {
+        let owner = self.owners_of_columns(active);
+        let all = self.energy(search, &|_| true);
+        (0..active.len()).map(|i| all / self.energy(search, &|column| owner[column] != Some(i))).collect()
+    }
+
+    /// By which factor it grows with all effects beside geometry.
+    fn without_all(&self, search: &Search, active: &[Active]) -> f64 {
+        let owner = self.owners_of_columns(active);
+        self.energy(search, &|_| true) / self.energy(search, &|column| owner[column].is_none())
+    }
+
+    /// Which effect every column belongs to; none those of geometry.
+    fn owners_of_columns(&self, active: &[Active]) -> Vec<Option<usize>> {
         let constants = self.raw.ncols() - active.iter().map(|e| e.columns.ncols()).sum::<usize>();
         let mut owner: Vec<Option<usize>> = vec![None; constants];
         active.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
-        let energy = |but: Option<usize>| {
-            let columns: Vec<usize> =
-                (0..owner.len()).filter(|c| owner[*c].is_none() || owner[*c] != but).collect();
-            let left = self.left_out(search, &columns);
-            let mut white = vec![0.0; left.len()];
-            search.rows.whitener.apply(&left, &mut white);
-            white.iter().map(|x| x * x).sum::<f64>()
-        };
-        let all = energy(None);
-        (0..active.len()).map(|i| all / energy(Some(i))).collect()
+        owner
+    }
+
+    /// Whitened sum of squares of what is left out, with these columns.
+    fn energy(&self, search: &Search, takes: &dyn Fn(usize) -> bool) -> f64 {
+        let columns: Vec<usize> = (0..self.raw.ncols()).filter(|column| takes(*column)).collect();
+        let left = self.left_out(search, &columns);
+        let mut white = vec![0.0; left.len()];
+        search.rows.whitener.apply(&left, &mut white);
+        white.iter().map(|x| x * x).sum()
     }
 
     /// Residuals of every row under the fit of these columns to the folds that the row is not in, m and rad.
