@@ -99,6 +99,7 @@ pub fn diagnose(
             heat: 1.0,
             in_motion: facts_are_smooth(&facts),
             known: RefCell::default(),
+            grounds: RefCell::default(),
         };
         active = search.run(&active);
         let judged = noise_of(&linear, &finding::residual_of(&search, &active), &runs, &out, &facts);
@@ -109,7 +110,7 @@ pub fn diagnose(
                 return Ok(finding::report(&search, &active, machine, library, &noise));
             }
             // Much is left, as it always is on real machines: the simplest names that stand out from it count.
-            let search = Search { heat, known: RefCell::default(), ..search };
+            let search = Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
             active = folds::useful(&search, &search.run(&active), most_wild);
             return Ok(finding::report(&search, &active, machine, library, &noise));
         }

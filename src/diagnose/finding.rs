@@ -48,6 +48,9 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
+    /// Part of the structure left over by geometry that is no family's shape, 0 to 1, where something was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape_share: Option<f64>,
     /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
@@ -116,7 +119,7 @@ pub struct Finding {
     pub explanation: String,
     /// Its sizes.
     pub coefficients: Vec<Size>,
-    /// Probability that name and place are right.
+    /// Probability that name and place are right, or are those of a rival that the recordings cannot tell from it.
     pub probability: f64,
     /// Half of it is the logarithm of the evidence for it.
     pub delta_bic: f64,
@@ -179,6 +182,8 @@ const SHIFT: f64 = 0.002;
 const ALIKE: f64 = 0.12;
 /// A common effect of which the shape is less than this part of all is what it looks like.
 const PLAIN: f64 = 0.01;
+/// Names whose odds are no less than this part of the best one's cannot be told from it.
+const ALIAS: f64 = 1.0 / 3.0;
 /// But no names that are so much rarer, as a logarithm.
 const RARER: f64 = 1.2;
 /// Logarithm of the odds at which a finding is told.
@@ -231,16 +236,26 @@ pub(super) fn report(
         }
         let is_plain = search.commonness[own.candidate] == 0.0 && shares.shapes < PLAIN * total;
         let odds = odds(search, &rivals, own, left.heat.max(search.heat), is_plain);
-        let probability =
-            odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
+        let own_odds = odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
+        let alike = odds.iter().map(|(_, p, _)| *p).filter(|p| *p >= ALIAS * own_odds);
+        let probability = alike.sum::<f64>().min(1.0);
         let candidate = &search.candidates[effect.candidate];
         let family = &library.families()[candidate.family];
-        let solved = model.effect(search, active, i);
+        let departure = (shares.shapes / total).sqrt();
+        let mut solved = model.effect(search, active, i, departure);
+        let mut parameters = effect.score.parameters.clone();
+        let jumps = |p: &usize| !candidate.parameters[*p].smooth && !candidate.parameters[*p].whole;
+        for p in (0..parameters.len()).filter(jumps) {
+            let Some((middle, deviation)) = Model::jumping(search, active, i, p) else { continue };
+            parameters[p] = middle;
+            let own = solved.coefficients.len() + p;
+            solved.covariance[own][own] = deviation * deviation;
+        }
         let identified = Identified {
             family,
             candidate,
             coefficients: solved.coefficients,
-            parameters: effect.score.parameters.clone(),
+            parameters,
             covariance: Some(solved.covariance),
         };
         let sizes = identified.sizes(&linear.samples);
@@ -313,6 +328,7 @@ pub(super) fn report(
         rms_rad: by_model(linear.fit.rms_rad, rms_of(search, &left_over, true)),
         held_out_rms_m: None,
         held_out_rms_rad: None,
+        shape_share: (!findings.is_empty()).then(|| shares.shapes / total),
         findings,
         unexplained,
         named,

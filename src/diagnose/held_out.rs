@@ -11,8 +11,14 @@ pub(super) struct Model {
     /// First column of each effect.
     offsets: Vec<usize>,
     solution: DVector<f64>,
-    covariance: DMatrix<f64>,
 }
+
+/// Sizes are told as if shapes departed from the families' by this part of what the search allows them, where they seem not to at all.
+const UNKNOWN_SHAPE: f64 = 0.04;
+/// Where a parameter that jumps costs this much, as a logarithm, it is two standard deviations off if it were normal.
+const UNLIKELY: f64 = 2.0;
+/// Halvings on the way there.
+const HALVINGS: usize = 20;
 
 /// Numbers of one effect.
 pub(super) struct Solved {
@@ -37,10 +43,9 @@ impl Model {
             }
         }
         let gram = columns.tr_mul(&columns) + DMatrix::identity(columns.ncols(), columns.ncols());
-        let covariance =
-            gram.clone().try_inverse().unwrap_or_else(|| DMatrix::identity(gram.nrows(), gram.nrows()));
-        let solution = &covariance * columns.tr_mul(&search.rows.residual);
-        Model { columns, offsets, solution, covariance }
+        let identity = || DMatrix::identity(gram.nrows(), gram.nrows());
+        let solution = gram.clone().try_inverse().unwrap_or_else(identity) * columns.tr_mul(&search.rows.residual);
+        Model { columns, offsets, solution }
     }
 
     /// Residuals in m and rad with everything taken away. The columns of effects and constants are taken before whitening.
@@ -60,8 +65,9 @@ impl Model {
         left.as_slice().to_vec()
     }
 
-    /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together.
-    pub fn effect(&self, search: &Search, active: &[Active], i: usize) -> Solved {
+    /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together. `shape`: part of the
+    /// amplitudes by which shapes seem to depart from the families'.
+    pub fn effect(&self, search: &Search, active: &[Active], i: usize, shape: f64) -> Solved {
         let effect = &active[i];
         let candidate = &search.candidates[effect.candidate];
         let units = search.rows.units(candidate, &effect.score.parameters);
@@ -91,18 +97,15 @@ impl Model {
         }
         let mut covariance = vec![vec![0.0; all + parameters]; all + parameters];
         let own = |c: usize| self.offsets[i] + c;
-        if slopes.is_empty() {
-            for (a, row) in covariance.iter_mut().enumerate().take(k) {
-                for (b, x) in row.iter_mut().enumerate().take(k) {
-                    *x = scale(a) * scale(b) * self.covariance[(own(a), own(b))];
-                }
-            }
-            return Solved { coefficients, covariance };
-        }
         let at = self.columns.ncols();
         let mut wide = self.columns.clone().insert_columns(at, slopes.len(), 0.0);
         for (s, (_, column, range)) in slopes.iter().enumerate() {
             wide.set_column(at + s, &(column * *range));
+        }
+        for effect in active {
+            let at = wide.ncols();
+            wide = wide.insert_columns(at, effect.shape.ncols(), 0.0);
+            wide.columns_mut(at, effect.shape.ncols()).copy_from(&(&effect.shape * shape.max(UNKNOWN_SHAPE)));
         }
         let gram = wide.tr_mul(&wide) + DMatrix::identity(wide.ncols(), wide.ncols());
         let Some(inverse) = gram.try_inverse() else { return Solved { coefficients, covariance } };
@@ -117,5 +120,32 @@ impl Model {
             }
         }
         Solved { coefficients, covariance }
+    }
+
+    /// Middle and standard deviation of a parameter that jumps, between the places where the data begin to speak against it.
+    pub fn jumping(search: &Search, active: &[Active], i: usize, p: usize) -> Option<(f64, f64)> {
+        let effect = &active[i];
+        let candidate = &search.candidates[effect.candidate];
+        let (at, parameter) = (&effect.score.parameters, &candidate.parameters[p]);
+        let field = search.rows.field(search.beside(active, Some(i)));
+        let evidence = |value: f64| {
+            let mut moved = at.clone();
+            moved[p] = value;
+            search.rows.score_at(candidate, &moved, &field, search.heat).map(|score| score.at_best)
+        };
+        let best = evidence(at[p])?;
+        let edge = |to: f64| {
+            let (mut inside, mut outside) = (at[p], to);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (inside + outside);
+                match evidence(middle).is_some_and(|e| e > best - UNLIKELY) {
+                    true => inside = middle,
+                    false => outside = middle,
+                }
+            }
+            0.5 * (inside + outside)
+        };
+        let (low, high) = (edge(parameter.range.0), edge(parameter.range.1));
+        Some((0.5 * (low + high), (high - low) / 12f64.sqrt()))
     }
 }

@@ -28,7 +28,7 @@ pub(super) struct Rows<'a> {
 
 /// What all candidates are judged against: the space, and the residuals beside it, fine and coarse.
 pub(super) struct Field {
-    pub space: Space,
+    pub space: Arc<Space>,
     /// `M r`.
     pub left: DVector<f64>,
     coarse_space: Space,
@@ -46,6 +46,8 @@ pub(super) struct Score {
     pub at_best: f64,
     /// Where on its grid it is best.
     pub parameters: Vec<f64>,
+    /// Other periods of a wave where it is nearly as good, as half or twice of it may be.
+    pub also: Vec<Vec<f64>>,
     /// How many of its coefficients take part, from the first.
     pub coefficients: usize,
     /// Half the misfit energy that it takes away there.
@@ -60,7 +62,7 @@ const ROOM: f64 = 4.0;
 const ROOM_BEYOND: f64 = 2.0;
 
 /// Columns that are built at a time.
-const BATCH: usize = 48;
+const BATCH: usize = 192;
 
 impl<'a> Rows<'a> {
     pub fn new(linear: &'a Linear, coarse: &'a Coarse, whitener: Whitener) -> Self {
@@ -71,7 +73,8 @@ impl<'a> Rows<'a> {
     }
 
     /// What candidates are judged against beside a space.
-    pub fn field(&self, space: Space) -> Field {
+    pub fn field(&self, space: impl Into<Arc<Space>>) -> Field {
+        let space = space.into();
         let left = space.apply(&self.residual);
         let coarse_space = Space::of_factor(self.coarse.reduce_all(space.factor()));
         let coarse_left = DVector::from_vec(self.coarse.reduce(left.as_slice()));
@@ -146,8 +149,7 @@ impl<'a> Rows<'a> {
 
     /// Every feature at every sample; `None` if one is not there.
     fn features(&self, candidate: &Candidate, parameters: &[f64]) -> Option<Vec<Vec<f64>>> {
-        let features: Vec<Vec<f64>> =
-            candidate.features.iter().map(|f| f.over(&self.linear.samples, parameters)).collect();
+        let features = candidate.over(&self.linear.samples, parameters);
         features.iter().all(|f| f.iter().all(|x| x.is_finite())).then_some(features)
     }
 
@@ -197,7 +199,11 @@ impl<'a> Rows<'a> {
                 let gain = 0.5 * part * gain;
                 *best = Some(Best { evidence: gain / heat + none, length: lengths[0], gain, room: ROOM });
             }
-            return summary(&candidate.grid, &table, &peaks);
+            let mut summary = summary(&candidate.grid, &table, &peaks)?;
+            let nearly = |i: &&usize| table[**i].as_ref().is_some_and(|b| b.evidence > NEARLY * summary.at_best);
+            let also = peaks.iter().filter(nearly).map(|i| candidate.grid[*i].clone());
+            summary.also = also.filter(|at| *at != summary.parameters).collect();
+            return Some(summary);
         }
         let kept = self.coarse.features(i, candidate, &self.linear.samples);
         self.table(candidate, &candidate.grid, field, kept, heat, &all, &mut table);
@@ -233,7 +239,7 @@ impl<'a> Rows<'a> {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
         let (space, left) = match kept {
             Some(_) => (&field.coarse_space, &field.coarse_left),
-            None => (&field.space, &field.left),
+            None => (&*field.space, &field.left),
         };
         for batch in points.chunks((BATCH / k).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
@@ -319,6 +325,8 @@ struct Best {
 const WAVES: usize = 64;
 /// Best points that are looked at finely.
 const FINE: usize = 6;
+/// Of those, the ones with this part of the best one's evidence may be better once they are refined.
+const NEARLY: f64 = 0.85;
 
 /// The best of these points, and the evidence of all.
 fn summary(grid: &[Vec<f64>], table: &[Option<Best>], points: &[usize]) -> Option<Score> {
@@ -331,6 +339,7 @@ fn summary(grid: &[Vec<f64>], table: &[Option<Best>], points: &[usize]) -> Optio
         evidence: log_mean_exp(&all) + tried,
         at_best: best.evidence,
         parameters: grid[at].clone(),
+        also: Vec::new(),
         coefficients: best.length,
         gain: best.gain,
         room: best.room,

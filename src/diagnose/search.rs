@@ -1,8 +1,9 @@
 //! Which effects together explain the recordings best: forward, backward, swaps, each against all candidates.
 
 use std::cell::RefCell;
-use std::collections::{HashMap, HashSet};
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::rc::Rc;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -65,6 +66,8 @@ pub(super) struct Search<'a> {
     pub in_motion: bool,
     /// Rivals that are known, by what has been taken in besides.
     pub known: RefCell<Known>,
+    /// The last spaces that candidates were judged beside, by what had been taken in.
+    pub grounds: RefCell<VecDeque<(Vec<Mark>, Arc<Space>)>>,
 }
 
 /// Rivals by the effect that stood aside and by those that were taken in.
@@ -105,8 +108,10 @@ const REPEATED: f64 = 0.15;
 const SHAPE: f64 = 0.35;
 /// An effect that was taken for the shape of another is at least this part of it.
 const HIDDEN: f64 = 0.8;
+/// So many spaces are kept.
+const GROUNDS: usize = 12;
 /// More effects are not looked for.
-const MOST: usize = 5;
+const MOST: usize = 8;
 /// Logarithm of the odds at which an effect is taken in.
 const ENTER: f64 = 8.0;
 
@@ -153,13 +158,13 @@ impl Search<'_> {
         if let Some(known) = known.get(&(None, marks.clone())).or_else(|| known.get(&(of, marks.clone()))) {
             return known.clone();
         }
-        let rivals = Rc::new(self.compare(&self.ground(active, but), among));
+        let rivals = Rc::new(self.compare(self.ground(active, but), among));
         known.insert((among.and(of), marks), rivals.clone());
         rivals
     }
 
-    fn compare(&self, space: &Space, among: Option<&[usize]>) -> Vec<Rival> {
-        let field = self.rows.field(space.clone());
+    fn compare(&self, space: Arc<Space>, among: Option<&[usize]>) -> Vec<Rival> {
+        let field = self.rows.field(space);
         // What progress is told is no matter of the threads.
         let (rows, priors, candidates, heat) = (self.rows, &self.priors, self.candidates, self.heat);
         let all: Vec<usize> = among.map_or_else(|| (0..candidates.len()).collect(), <[usize]>::to_vec);
@@ -222,24 +227,32 @@ impl Search<'_> {
     /// The space beside all active effects but one.
     pub fn beside(&self, active: &[Active], but: Option<usize>) -> Space {
         let others = active.iter().enumerate().filter(|(i, _)| Some(*i) != but);
-        others.fold(self.base.clone(), |space, (_, effect)| {
-            space.with(&effect.columns).with(&effect.state).with(&effect.shape)
-        })
+        let parts: Vec<&DMatrix<f64>> = others.flat_map(|(_, e)| [&e.columns, &e.state, &e.shape]).collect();
+        self.base.with(&side_by_side(&parts, self.rows.residual.len()))
     }
 
     /// The space beside all active effects but one, their shapes as the families' where they would depart too far: what is hidden there
     /// is another effect, or unexplained.
-    fn ground(&self, active: &[Active], but: Option<usize>) -> Space {
+    fn ground(&self, active: &[Active], but: Option<usize>) -> Arc<Space> {
         let others = all_but(active, but);
-        match !others.is_empty() && self.shares(&others).is_misshapen(others.len()) {
+        let marks: Vec<Mark> = others.iter().map(Active::mark).collect();
+        if let Some((_, known)) = self.grounds.borrow().iter().find(|(of, _)| *of == marks) {
+            return known.clone();
+        }
+        let ground = Arc::new(match !others.is_empty() && self.shares(&others).is_misshapen(others.len()) {
             true => self.beside_names(&others),
             false => self.beside(&others, None),
-        }
+        });
+        let mut grounds = self.grounds.borrow_mut();
+        grounds.push_front((marks, ground.clone()));
+        grounds.truncate(GROUNDS);
+        ground
     }
 
     /// The space beside the names alone, as if their shapes were the families'.
     pub fn beside_names(&self, active: &[Active]) -> Space {
-        active.iter().fold(self.base.clone(), |space, effect| space.with(&effect.columns).with(&effect.state))
+        let parts: Vec<&DMatrix<f64>> = active.iter().flat_map(|e| [&e.columns, &e.state]).collect();
+        self.base.with(&side_by_side(&parts, self.rows.residual.len()))
     }
 
     /// What is left beside the active effects.
@@ -418,13 +431,37 @@ impl Search<'_> {
     }
 }
 
+/// Columns of all parts.
+fn side_by_side(parts: &[&DMatrix<f64>], rows: usize) -> DMatrix<f64> {
+    let mut joined = DMatrix::zeros(rows, parts.iter().map(|p| p.ncols()).sum());
+    let mut at = 0;
+    for part in parts {
+        joined.columns_mut(at, part.ncols()).copy_from(part);
+        at += part.ncols();
+    }
+    joined
+}
+
 /// All effects but one.
 pub(super) fn all_but(active: &[Active], but: Option<usize>) -> Vec<Active> {
     active.iter().enumerate().filter(|(i, _)| Some(*i) != but).map(|(_, effect)| effect.clone()).collect()
 }
 
-/// Moves the parameters between the points of the grid to where the evidence is greatest; the evidence over the grid grows alike.
+/// Moves the parameters between the points of the grid to where the evidence is greatest, from every point that may lead there.
 fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
+    let best = refined(rows, candidate, rival, field, heat);
+    let others = rival.score.also.iter().filter_map(|parameters| {
+        let here = rows.score_at(candidate, parameters, field, heat)?;
+        let lower = rival.score.at_best - here.at_best;
+        let score = Score { evidence: rival.score.evidence - lower, ..here };
+        let start = Rival { candidate: rival.candidate, weight: rival.weight - lower, score };
+        Some(refined(rows, candidate, &start, field, heat))
+    });
+    others.fold(best, |best, other| if other.weight > best.weight { other } else { best })
+}
+
+/// The same from one point; the evidence over the grid grows alike.
+fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
     let at = |parameters: &[f64]| rows.score_at(candidate, parameters, field, heat);
     let start = rival.score.at_best;
     let Some(here) = at(&rival.score.parameters) else { return rival.clone() };

@@ -2,10 +2,12 @@
 
 use super::score::{Field, Rows};
 use super::spectrum::Spectrum;
-use crate::effects::Candidate;
+use crate::effects::{Candidate, Coefficient};
 
 /// Rows on which the energy of waves is judged.
 const MEMORIES: usize = 256;
+/// Of more frequencies, the energy is asked at so many.
+const KNOTS: usize = 1000;
 
 impl Rows<'_> {
     /// Energy that a pair of sine and cosine of one phase takes away, at every point of the grid, as if it had nothing in common with
@@ -39,22 +41,30 @@ impl Rows<'_> {
                 .map(|point| phase.over(&one, point).first().map_or(f64::NAN, |phase| phase / x[reference]))
                 .collect();
             let largest = factors.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
-            for coefficient in candidate.coefficients.iter().filter(|c| c.order == 2 * pair) {
-                let mut weights = vec![0.0; x.len()];
-                let mut energies = vec![0.0; factors.len()];
-                for part in &coefficient.parts {
-                    let answer = self.answer(part.slot, part.direction);
-                    answer.iter().zip(&dual).enumerate().for_each(|(row, (a, d))| {
-                        weights[self.linear.sample[row]] += a * d;
-                    });
-                    self.wave_energies(&answer, &x, &factors, &mut energies);
+            let own: Vec<&Coefficient> =
+                candidate.coefficients.iter().filter(|c| c.order == 2 * pair).collect();
+            for two in own.chunks(2) {
+                let mut weights = [vec![0.0; x.len()], vec![0.0; x.len()]];
+                let mut energies = [vec![0.0; factors.len()], vec![0.0; factors.len()]];
+                for (coefficient, (weights, energies)) in
+                    two.iter().zip(weights.iter_mut().zip(&mut energies))
+                {
+                    for part in &coefficient.parts {
+                        let answer = self.answer(part.slot, part.direction);
+                        answer.iter().zip(&dual).enumerate().for_each(|(row, (a, d))| {
+                            weights[self.linear.sample[row]] += a * d;
+                        });
+                        self.wave_energies(&answer, &x, &factors, energies);
+                    }
                 }
-                if energies.iter().all(|energy| *energy <= 0.0) {
+                if energies.iter().flatten().all(|energy| *energy <= 0.0) {
                     continue;
                 }
-                let spectrum = Spectrum::new(&x, &weights, largest)?;
-                for ((f, energy), gain) in factors.iter().zip(&energies).zip(&mut gains) {
-                    *gain += if *energy > 0.0 { spectrum.power(*f) / (0.5 * energy) } else { 0.0 };
+                let spectrum = Spectrum::new(&x, [&weights[0], &weights[1]], largest)?;
+                for (i, (factor, gain)) in factors.iter().zip(&mut gains).enumerate() {
+                    for (power, energies) in spectrum.powers(*factor).into_iter().zip(&energies) {
+                        *gain += if energies[i] > 0.0 { power / (0.5 * energies[i]) } else { 0.0 };
+                    }
                 }
             }
         }
@@ -67,13 +77,33 @@ impl Rows<'_> {
         let mut plain = vec![0.0; answer.len()];
         self.whitener.plain(answer, &mut plain);
         let step = plain.len().div_ceil(MEMORIES).max(1);
-        for row in (0..plain.len()).step_by(step) {
+        // (energy, what is remembered, advance of the phase) of the rows that are looked at.
+        let looked_at = (0..plain.len()).step_by(step).map(|row| {
             let energy = plain[row] * plain[row] * step as f64;
             let (before, rho) = self.whitener.memory(row).unwrap_or((row, 0.0));
-            let advance = x[self.linear.sample[row]] - x[self.linear.sample[before]];
-            for (f, sum) in factors.iter().zip(energies.iter_mut()) {
-                *sum += energy
-                    * (1.0 + rho * rho - if rho > 0.0 { 2.0 * rho * (f * advance).cos() } else { 0.0 });
+            (energy, rho, x[self.linear.sample[row]] - x[self.linear.sample[before]])
+        });
+        let (remembering, forgetful): (Vec<_>, Vec<_>) = looked_at.partition(|(_, rho, _)| *rho > 0.0);
+        let constant: f64 = forgetful.iter().map(|(energy, ..)| energy).sum();
+        let at = |factor: f64| {
+            let of = |(energy, rho, advance): &(f64, f64, f64)| {
+                energy * (1.0 + rho * rho - 2.0 * rho * (factor * advance).cos())
+            };
+            constant + remembering.iter().map(of).sum::<f64>()
+        };
+        if remembering.is_empty() || factors.len() <= KNOTS {
+            energies.iter_mut().zip(factors).for_each(|(sum, factor)| *sum += at(*factor));
+            return;
+        }
+        // It changes as slowly with the factor as the phase advances from row to row: knots are enough.
+        let stride = factors.len().div_ceil(KNOTS);
+        for from in (0..factors.len()).step_by(stride) {
+            let to = (from + stride).min(factors.len() - 1);
+            let (first, last) = (at(factors[from]), at(factors[to]));
+            for i in from..(from + stride).min(factors.len()) {
+                let extent = factors[to] - factors[from];
+                let part = if extent == 0.0 { 0.0 } else { (factors[i] - factors[from]) / extent };
+                energies[i] += first + part * (last - first);
             }
         }
     }

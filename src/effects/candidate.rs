@@ -233,6 +233,9 @@ fn candidate(
             ));
         }
     }
+    if family.one_clock && !facts.one_clock {
+        return Err(grid::MANY_CLOCKS.into());
+    }
     if family.needs_masses && !own.is_some_and(|j| has_masses(machine, j)) {
         return Err("the machine file states no masses beyond the joint".into());
     }

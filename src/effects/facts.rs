@@ -19,6 +19,8 @@ pub struct RecordingFacts {
     pub places: Vec<Option<usize>>,
     /// First and last time, s, if all recordings have one.
     pub time: Option<(f64, f64)>,
+    /// Whether the recordings follow one another on one clock: times that overlap are of clocks of their own.
+    pub one_clock: bool,
     /// Duration of the longest recording, s.
     pub longest: f64,
     /// Median time from a sample to the next in the recording where it is smallest, s.
@@ -65,6 +67,7 @@ impl RecordingFacts {
             spacing: vec![0.0; dyads],
             places: vec![None; dyads],
             time: None,
+            one_clock: true,
             longest: 0.0,
             step: None,
             settled: false,
@@ -73,10 +76,11 @@ impl RecordingFacts {
             readings: Vec::new(),
         };
         let mut all_timed = true;
+        let mut spans: Vec<(f64, f64)> = Vec::new();
         let mut seen: Vec<Vec<f64>> = vec![Vec::new(); dyads];
         for (i, recording) in recordings.iter().enumerate() {
             all_timed &= recording.has_time();
-            facts.take(machine, recording, &mut seen)?;
+            spans.extend(facts.take(machine, recording, &mut seen)?);
             let channels = recording.extra_channels().iter().map(|c| (c.name.clone(), c.unit.quantity));
             match i {
                 0 => facts.channels = channels.collect(),
@@ -93,6 +97,8 @@ impl RecordingFacts {
         if !all_timed {
             (facts.time, facts.step, facts.longest) = (None, None, 0.0);
         }
+        spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+        facts.one_clock = spans.windows(2).all(|pair| pair[0].1 <= pair[1].0);
         for (j, positions) in seen.into_iter().enumerate() {
             facts.places[j] = facts.travel[j].and_then(|travel| places(&positions, travel));
             facts.spacing[j] = facts.travel[j].map_or(0.0, |travel| spacing(positions, travel));
@@ -104,7 +110,13 @@ impl RecordingFacts {
         Ok(facts)
     }
 
-    fn take(&mut self, machine: &Machine, recording: &Recording, seen: &mut [Vec<f64>]) -> Result<()> {
+    /// Takes a recording in; its first and last time, if it has any.
+    fn take(
+        &mut self,
+        machine: &Machine,
+        recording: &Recording,
+        seen: &mut [Vec<f64>],
+    ) -> Result<Option<(f64, f64)>> {
         let commands = machine.commands().len();
         let mut own: Vec<Option<(f64, f64)>> = vec![None; machine.dyads().len()];
         let mut steps: Vec<(f64, Vec<f64>)> = Vec::new();
@@ -165,7 +177,7 @@ impl RecordingFacts {
                 (all, own) => all.or(own),
             };
         }
-        Ok(())
+        Ok(span)
     }
 
     /// Whether the joint of dyad `j` moves.

@@ -46,6 +46,9 @@ pub struct Family {
     /// Tried only where the recordings last this long, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lasts: Option<f64>,
+    /// Goes on from one recording to the next: tried only where they follow one another on one clock.
+    #[serde(default)]
+    pub one_clock: bool,
     /// Tried only where the machine file states masses beyond the joint.
     #[serde(default)]
     pub needs_masses: bool,

@@ -25,6 +25,7 @@ pub(super) fn range(
             }
             Ok((from, to))
         }
+        Range::Time if !facts.one_clock => Err(MANY_CLOCKS.into()),
         Range::Time => facts.time.ok_or_else(|| NO_TIME.into()).map(|(from, to)| (0.0, to - from)),
         Range::ByKind | Range::Between(..) => {
             let (from, to, dimension) = form.stated(own).ok_or("no range is given for this kind of place")?;
@@ -52,6 +53,8 @@ fn resolved(
     }
     Ok((from, to))
 }
+
+pub(super) const MANY_CLOCKS: &str = "it needs one clock, and the recordings' times overlap";
 
 pub(super) const NO_TIME: &str = "it needs time, and a recording has no column t";
 

@@ -39,19 +39,39 @@ struct Wave {
 }
 
 impl Candidate {
-    /// Calls `visit` with the index of every point of the grid, in order, and one column for each feature: [`Feature::over`] for
-    /// all of them, to rounding.
-    pub fn scan(&self, stretches: &[Samples], mut visit: impl FnMut(usize, &[Vec<f64>])) {
+    /// Every feature at every sample: [`Feature::over`] for all of them, sines and cosines of one phase at once.
+    pub fn over(&self, stretches: &[Samples], parameters: &[f64]) -> Vec<Vec<f64>> {
+        let waves = self.waves();
+        let mut columns = vec![Vec::new(); self.features.len()];
+        for wave in &waves {
+            let turn = Turn::of(wave.phase.over(stretches, parameters).into_iter());
+            for (i, cosine) in &wave.members {
+                columns[*i].clone_from(if *cosine { &turn.cosine } else { &turn.sine });
+            }
+        }
+        for (feature, column) in self.features.iter().zip(&mut columns).filter(|(_, c)| c.is_empty()) {
+            *column = feature.over(stretches, parameters);
+        }
+        columns
+    }
+
+    /// Features that are sines and cosines, by their phase.
+    fn waves(&self) -> Vec<Wave> {
         let mut waves: Vec<Wave> = Vec::new();
         for (i, feature) in self.features.iter().enumerate() {
-            let Some((cosine, phase)) = feature.wave().filter(|_| self.parameters.len() == 1) else {
-                continue;
-            };
+            let Some((cosine, phase)) = feature.wave() else { continue };
             match waves.iter_mut().find(|wave| wave.phase == phase) {
                 Some(wave) => wave.members.push((i, cosine)),
                 None => waves.push(Wave { phase, members: vec![(i, cosine)] }),
             }
         }
+        waves
+    }
+
+    /// Calls `visit` with the index of every point of the grid, in order, and one column for each feature: [`Feature::over`] for
+    /// all of them, to rounding.
+    pub fn scan(&self, stretches: &[Samples], mut visit: impl FnMut(usize, &[Vec<f64>])) {
+        let waves = if self.parameters.len() == 1 { self.waves() } else { Vec::new() };
         let mut columns = vec![Vec::new(); self.features.len()];
         let is_wave = |i: usize| waves.iter().any(|wave| wave.members.iter().any(|(m, _)| *m == i));
         for (block, points) in self.grid.chunks(BLOCK).enumerate() {
