@@ -38,7 +38,7 @@ use serde::Serialize;
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
-use crate::lie::Twist;
+use crate::lie::{Pose, Twist};
 use crate::machine::Machine;
 use crate::recording::Recording;
 pub use crate::rms::Rms;
@@ -90,6 +90,9 @@ const LENGTHS: [f64; 3] = [0.5, 1.0, 2.0];
 const ANGLES: [f64; 3] = [0.5, 1.0, 2.0];
 /// Rounds of choosing factors; the second sees what the first has changed.
 const SIZE_ROUNDS: usize = 2;
+/// Fits with gravity as the fit before has it, at most; and the angle below which nothing turns any more, rad.
+const GRAVITY_ROUNDS: usize = 5;
+const UPRIGHT: f64 = 1e-5;
 /// Rounds of re-estimating the noise from the residuals.
 const NOISE_ROUNDS: usize = 12;
 
@@ -116,6 +119,36 @@ pub fn calibrate_model(
     options: Options,
     progress: &dyn Fn(&str),
 ) -> Result<(CalibratedMachine, Fit)> {
+    upright(|frames| attempt(machine, recordings, model, options, frames, progress))
+}
+
+/// Frames `w` of the set-ups as they stand before dyad `w`, where gravity hangs on them.
+type Frames = Option<Vec<Pose<f64>>>;
+
+/// Fits again with gravity as the last fit has it, until frame `w` of no set-up turns any more: the weight of an arm tilts what the
+/// frame is found from.
+fn upright<T>(fit: impl Fn(Option<&[Pose<f64>]>) -> Result<(T, Frames)>) -> Result<T> {
+    let (mut found, mut frames) = fit(None)?;
+    for _ in 1..GRAVITY_ROUNDS {
+        let Some(before) = frames else { break };
+        (found, frames) = fit(Some(&before))?;
+        let turn = |(a, b): (&Pose<f64>, &Pose<f64>)| (a.inverse() * *b).log().w.norm();
+        let turned = frames.iter().flatten().zip(&before).map(turn).fold(0.0, f64::max);
+        if turned < UPRIGHT {
+            break;
+        }
+    }
+    Ok(found)
+}
+
+fn attempt(
+    machine: &Machine,
+    recordings: &[Recording],
+    model: &Model,
+    options: Options,
+    frames: Option<&[Pose<f64>]>,
+    progress: &dyn Fn(&str),
+) -> Result<((CalibratedMachine, Fit), Frames)> {
     let varying = &model.varying;
     let mut sources = Sources::new(recordings, machine, varying, &model.dead_bands, progress)?;
     if let Some(count) = model.samples {
@@ -141,7 +174,7 @@ pub fn calibrate_model(
     }
     let prior = options.prior && options.solver.uses_prior();
     let start = Unknowns::nominal(machine, &sources, varying);
-    turn_gravity(machine, &mut sources, &layout, start.clone())?;
+    let hangs = turn_gravity(machine, &mut sources, &layout, start.clone(), frames)?;
     // As declared: only what nobody has stated is fitted.
     let mut problem = Problem::new(machine, &sources, &layout, varying, is_of_setup);
     problem.progress = progress;
@@ -199,7 +232,8 @@ pub fn calibrate_model(
             samples: fit.piece_samples.clone(),
         });
     }
-    Ok((calibrated, fit))
+    let frames = hangs.then(|| unknowns.setups.iter().map(|setup| setup.pose()).collect());
+    Ok(((calibrated, fit), frames))
 }
 
 /// All pairs of factors on error motions.
@@ -222,6 +256,15 @@ pub fn fit_setup(
     recordings: &[Recording],
     loss: Loss,
 ) -> Result<CalibratedMachine> {
+    upright(|frames| attempt_setup(calibrated, recordings, loss, frames))
+}
+
+fn attempt_setup(
+    calibrated: &CalibratedMachine,
+    recordings: &[Recording],
+    loss: Loss,
+    frames: Option<&[Pose<f64>]>,
+) -> Result<(CalibratedMachine, Frames)> {
     let (machine, (variation, _)) = (calibrated.machine(), calibrated.variation_in(recordings));
     let varying = &variation.varying;
     let dead_bands: Vec<_> = variation.dead_bands.iter().map(|band| Some(*band)).collect();
@@ -232,7 +275,7 @@ pub fn fit_setup(
     start.dh = calibrated.deviations().to_vec();
     (start.parts, start.coefficients) = (variation.parts.clone(), variation.coefficients.clone());
     start.dh[machine.w_index()] = Twist::zero(0.0);
-    turn_gravity(machine, &mut sources, &layout, start.clone())?;
+    let hangs = turn_gravity(machine, &mut sources, &layout, start.clone(), frames)?;
     let mut problem = Problem::new(machine, &sources, &layout, varying, |block| {
         !matches!(block.role, Role::Dyad(_) | Role::Part { .. } | Role::Term(_))
     });
@@ -240,8 +283,9 @@ pub fn fit_setup(
     let Placed { solution: placed, noise, .. } = place(&mut problem, start)?;
     let found = settle(&problem, Solver::LevenbergMarquardt, placed.unknowns, noise)?;
     let mut fitted = calibrated.clone();
-    put_setups(&mut fitted, &sources, &found.solution.unknowns);
-    Ok(fitted)
+    let unknowns = &found.solution.unknowns;
+    put_setups(&mut fitted, &sources, unknowns);
+    Ok((fitted, hangs.then(|| unknowns.setups.iter().map(|setup| setup.pose()).collect())))
 }
 
 /// The machine with all that was found.
@@ -346,19 +390,30 @@ struct Placed {
     thin: Vec<Thin>,
 }
 
-/// Where gravity is stated in a frame `w` that nobody knows, that frame is found first, with constant deviations alone: what weighs
-/// depends on it. What is left of its error, some millirad, changes a torque by some thousandths.
-fn turn_gravity(machine: &Machine, sources: &mut Sources, layout: &Layout, start: Unknowns) -> Result<()> {
+/// Where gravity is stated in a frame `w` that nobody knows, that frame is found first, with constant deviations alone, unless
+/// `frames` say where it stands: what weighs depends on it. Whether it does.
+fn turn_gravity(
+    machine: &Machine,
+    sources: &mut Sources,
+    layout: &Layout,
+    start: Unknowns,
+    frames: Option<&[Pose<f64>]>,
+) -> Result<bool> {
     let stated =
         |s: &source::Source| s.recording.header().gravity_w.is_some() && sources.frame_unknown[s.setup];
     if !(sources.has_weight() && sources.all.iter().any(stated)) {
-        return Ok(());
+        return Ok(false);
+    }
+    if let Some(frames) = frames {
+        sources.turn_gravity(|setup| frames[setup])?;
+        return Ok(true);
     }
     let (constant, start) =
         (Varying::default(), Unknowns { coefficients: vec![0.0; start.coefficients.len()], ..start });
     let mut problem = Problem::new(machine, sources, layout, &constant, is_of_setup);
     let frames = place(&mut problem, start)?.solution.unknowns.setups;
-    sources.turn_gravity(|setup| frames[setup].pose())
+    sources.turn_gravity(|setup| frames[setup].pose())?;
+    Ok(true)
 }
 
 /// Set-ups found from nothing and then exactly, the machine held. What the data leave open of them is frozen, here and in all that

@@ -97,6 +97,8 @@ pub(super) const VISIBLE: f64 = 0.02;
 const MANY: usize = 500;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
+/// The same among settled positions, where many joints give way a little each.
+const WORTH_SETTLED: f64 = 0.08;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
 const OWN_SHAPE: f64 = 0.004;
 const OTHER_SHAPE: f64 = 0.002;
@@ -341,7 +343,8 @@ impl Search<'_> {
         let shares = self.shares(active);
         let least = match shares.is_misshapen(active.len()) {
             true => HIDDEN * shares.shapes,
-            false => WORTH * before.energy,
+            false if self.in_motion => WORTH * before.energy,
+            false => WORTH_SETTLED * before.energy,
         };
         if best.score.gain < self.shape_error(best, active) || 2.0 * best.score.gain < least {
             return None;
