@@ -171,3 +171,58 @@ fn what_a_recording_cannot_use_is_left_out_and_told() {
     );
     assert_eq!(predicted(&told, &path(&machine, "position", true)).1, alone);
 }
+
+#[test]
+fn a_machine_that_leans_is_found_with_its_weights_hanging_plumb() {
+    let (machine, library) = (common::machine("hilti_jaibot"), Library::standard());
+    let (lean, turn) = (0.05f64, 0.3f64);
+    // Readings of the machine where it stands upright in a frame that leans, then turned until that frame is plumb.
+    let blank = path(&machine, "position", true);
+    let header = |frame: &str, gravity: [f64; 3]| {
+        let [x, y, z] = gravity;
+        format!("# measurement: position\n# setup: here\n{frame}# gravity[w]: {x}, {y}, {z}\n")
+    };
+    let body = |text: &str| -> String {
+        text.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect()
+    };
+    let read = |text: String| Recording::from_bytes("lean.csv", text.into_bytes(), &machine).expect("reads");
+    let upright = header("", [lean.sin(), 0.0, -lean.cos()]);
+    let candidates = library.candidates(&machine, &RecordingFacts::of(&machine, &[blank]).expect("facts"));
+    let bending = candidates.all.iter().find(|c| c.effect == "column_compliance").expect("a column");
+    let told = with(&machine, vec![stored(&machine, &library, bending, 0.3)]);
+    let (_, text) = predicted(&told, &path(&machine, "position", true));
+    let blank = read(upright + &commands_and(&body(&text), |_| [0.0; 3]));
+    let (_, text) = predicted(&told, &blank);
+    let plumb = |p: [f64; 3]| {
+        let (s, c) = lean.sin_cos();
+        let [x, y, z] = [c * p[0] + s * p[2], p[1], -s * p[0] + c * p[2]];
+        let (s, c) = turn.sin_cos();
+        [c * x - s * y + 2.0, s * x + c * y - 1.0, z + 0.5]
+    };
+    let leaning = read(
+        header("# workpiece_frame: unknown\n", [0.0, 0.0, -1.0]) + &commands_and(&body(&text), plumb),
+    );
+    let found = kincal::identify::fit_setup(&told, std::slice::from_ref(&leaning), Default::default())
+        .unwrap_or_else(|e| panic!("{e}"));
+    let rms = predicted(&found, &leaning).0.rms_m.expect("positions");
+    assert!(rms < 1e-7, "{rms} m are left of readings without noise");
+}
+
+/// A recording's columns, its readings replaced by what `read` makes of the model's, m.
+fn commands_and(text: &str, read: impl Fn([f64; 3]) -> [f64; 3]) -> String {
+    let mut lines = text.lines();
+    let head: Vec<&str> = lines.next().expect("a head").split(',').collect();
+    let model: Vec<usize> = (0..head.len()).filter(|i| head[*i].contains("_model")).collect();
+    let kept: Vec<usize> = (0..head.len()).filter(|i| !head[*i].starts_with('p')).collect();
+    let unit = if head[model[0]].ends_with("[mm]") { 1e-3 } else { 1.0 };
+    let mut out =
+        kept.iter().map(|i| head[*i]).chain(["px[m]", "py[m]", "pz[m]"]).collect::<Vec<_>>().join(",") + "\n";
+    for line in lines {
+        let cells: Vec<&str> = line.split(',').collect();
+        let p = read([0, 1, 2].map(|k| unit * cells[model[k]].parse::<f64>().expect("a number")));
+        let commands = kept.iter().map(|i| cells[*i].to_string());
+        out += &commands.chain(p.iter().map(|x| format!("{x:.12}"))).collect::<Vec<_>>().join(",");
+        out += "\n";
+    }
+    out
+}
