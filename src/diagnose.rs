@@ -13,6 +13,7 @@ mod leftover;
 mod model;
 mod noise;
 mod outliers;
+mod refine;
 mod score;
 mod search;
 mod shape;

@@ -19,6 +19,7 @@ mod stretch;
 mod thin;
 mod unknowns;
 mod unseen;
+mod upright;
 mod warnings;
 
 pub(crate) use evaluator::{Evaluator, Moment, Values};
@@ -51,6 +52,7 @@ use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
 use thin::Thin;
 use unknowns::{Block, Layout, Role, Unknowns};
+use upright::{Frames, turn_gravity, upright};
 
 /// How to identify.
 #[derive(Clone, Copy, Debug)]
@@ -90,9 +92,6 @@ const LENGTHS: [f64; 3] = [0.5, 1.0, 2.0];
 const ANGLES: [f64; 3] = [0.5, 1.0, 2.0];
 /// Rounds of choosing factors; the second sees what the first has changed.
 const SIZE_ROUNDS: usize = 2;
-/// Fits with gravity as the fit before has it, at most; and the angle below which nothing turns any more, rad.
-const GRAVITY_ROUNDS: usize = 5;
-const UPRIGHT: f64 = 1e-5;
 /// Rounds of re-estimating the noise from the residuals.
 const NOISE_ROUNDS: usize = 12;
 
@@ -120,25 +119,6 @@ pub fn calibrate_model(
     progress: &dyn Fn(&str),
 ) -> Result<(CalibratedMachine, Fit)> {
     upright(|frames| attempt(machine, recordings, model, options, frames, progress))
-}
-
-/// Frames `w` of the set-ups as they stand before dyad `w`, where gravity hangs on them.
-type Frames = Option<Vec<Pose<f64>>>;
-
-/// Fits again with gravity as the last fit has it, until frame `w` of no set-up turns any more: the weight of an arm tilts what the
-/// frame is found from.
-fn upright<T>(fit: impl Fn(Option<&[Pose<f64>]>) -> Result<(T, Frames)>) -> Result<T> {
-    let (mut found, mut frames) = fit(None)?;
-    for _ in 1..GRAVITY_ROUNDS {
-        let Some(before) = frames else { break };
-        (found, frames) = fit(Some(&before))?;
-        let turn = |(a, b): (&Pose<f64>, &Pose<f64>)| (a.inverse() * *b).log().w.norm();
-        let turned = frames.iter().flatten().zip(&before).map(turn).fold(0.0, f64::max);
-        if turned < UPRIGHT {
-            break;
-        }
-    }
-    Ok(found)
 }
 
 fn attempt(
@@ -232,7 +212,7 @@ fn attempt(
             samples: fit.piece_samples.clone(),
         });
     }
-    let frames = hangs.then(|| unknowns.setups.iter().map(|setup| setup.pose()).collect());
+    let frames = hangs.then(|| upright::frames(unknowns));
     Ok(((calibrated, fit), frames))
 }
 
@@ -285,7 +265,7 @@ fn attempt_setup(
     let mut fitted = calibrated.clone();
     let unknowns = &found.solution.unknowns;
     put_setups(&mut fitted, &sources, unknowns);
-    Ok((fitted, hangs.then(|| unknowns.setups.iter().map(|setup| setup.pose()).collect())))
+    Ok((fitted, hangs.then(|| upright::frames(unknowns))))
 }
 
 /// The machine with all that was found.
@@ -388,32 +368,6 @@ struct Placed {
     solution: Solution,
     noise: Vec<Noise>,
     thin: Vec<Thin>,
-}
-
-/// Where gravity is stated in a frame `w` that nobody knows, that frame is found first, with constant deviations alone, unless
-/// `frames` say where it stands: what weighs depends on it. Whether it does.
-fn turn_gravity(
-    machine: &Machine,
-    sources: &mut Sources,
-    layout: &Layout,
-    start: Unknowns,
-    frames: Option<&[Pose<f64>]>,
-) -> Result<bool> {
-    let stated =
-        |s: &source::Source| s.recording.header().gravity_w.is_some() && sources.frame_unknown[s.setup];
-    if !(sources.has_weight() && sources.all.iter().any(stated)) {
-        return Ok(false);
-    }
-    if let Some(frames) = frames {
-        sources.turn_gravity(|setup| frames[setup])?;
-        return Ok(true);
-    }
-    let (constant, start) =
-        (Varying::default(), Unknowns { coefficients: vec![0.0; start.coefficients.len()], ..start });
-    let mut problem = Problem::new(machine, sources, layout, &constant, is_of_setup);
-    let frames = place(&mut problem, start)?.solution.unknowns.setups;
-    sources.turn_gravity(|setup| frames[setup].pose())?;
-    Ok(true)
 }
 
 /// Set-ups found from nothing and then exactly, the machine held. What the data leave open of them is frozen, here and in all that

@@ -199,9 +199,8 @@ fn a_machine_that_leans_is_found_with_its_weights_hanging_plumb() {
         let (s, c) = turn.sin_cos();
         [c * x - s * y + 2.0, s * x + c * y - 1.0, z + 0.5]
     };
-    let leaning = read(
-        header("# workpiece_frame: unknown\n", [0.0, 0.0, -1.0]) + &commands_and(&body(&text), plumb),
-    );
+    let leaning =
+        read(header("# workpiece_frame: unknown\n", [0.0, 0.0, -1.0]) + &commands_and(&body(&text), plumb));
     let found = kincal::identify::fit_setup(&told, std::slice::from_ref(&leaning), Default::default())
         .unwrap_or_else(|e| panic!("{e}"));
     let rms = predicted(&found, &leaning).0.rms_m.expect("positions");

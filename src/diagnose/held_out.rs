@@ -44,7 +44,8 @@ impl Model {
         }
         let gram = columns.tr_mul(&columns) + DMatrix::identity(columns.ncols(), columns.ncols());
         let identity = || DMatrix::identity(gram.nrows(), gram.nrows());
-        let solution = gram.clone().try_inverse().unwrap_or_else(identity) * columns.tr_mul(&search.rows.residual);
+        let solution =
+            gram.clone().try_inverse().unwrap_or_else(identity) * columns.tr_mul(&search.rows.residual);
         Model { columns, offsets, solution }
     }
 

@@ -200,7 +200,8 @@ impl<'a> Rows<'a> {
                 *best = Some(Best { evidence: gain / heat + none, length: lengths[0], gain, room: ROOM });
             }
             let mut summary = summary(&candidate.grid, &table, &peaks)?;
-            let nearly = |i: &&usize| table[**i].as_ref().is_some_and(|b| b.evidence > NEARLY * summary.at_best);
+            let nearly =
+                |i: &&usize| table[**i].as_ref().is_some_and(|b| b.evidence > NEARLY * summary.at_best);
             let also = peaks.iter().filter(nearly).map(|i| candidate.grid[*i].clone());
             summary.also = also.filter(|at| *at != summary.parameters).collect();
             return Some(summary);

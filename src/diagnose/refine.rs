@@ -1,0 +1,79 @@
+//! Parameters between the points of the grid: a candidate may be much better there.
+
+use super::score::{Field, Rows, Score};
+use super::search::Rival;
+use crate::effects::Candidate;
+
+/// Rounds over several parameters; parabolas, or halvings of a step where nothing is smooth, for each of them.
+const ROUNDS: usize = 2;
+const PARABOLAS: usize = 3;
+const HALVINGS: usize = 9;
+
+/// Moves the parameters between the points of the grid to where the evidence is greatest, from every point that may lead there.
+pub(super) fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
+    let best = refined(rows, candidate, rival, field, heat);
+    let others = rival.score.also.iter().filter_map(|parameters| {
+        let here = rows.score_at(candidate, parameters, field, heat)?;
+        let lower = rival.score.at_best - here.at_best;
+        let score = Score { evidence: rival.score.evidence - lower, ..here };
+        let start = Rival { candidate: rival.candidate, weight: rival.weight - lower, score };
+        Some(refined(rows, candidate, &start, field, heat))
+    });
+    others.fold(best, |best, other| if other.weight > best.weight { other } else { best })
+}
+
+/// The same from one point; the evidence over the grid grows alike.
+fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
+    let at = |parameters: &[f64]| rows.score_at(candidate, parameters, field, heat);
+    let start = rival.score.at_best;
+    let Some(here) = at(&rival.score.parameters) else { return rival.clone() };
+    let mut best = Score { evidence: rival.score.evidence, ..here };
+    let free: Vec<usize> =
+        (0..candidate.parameters.len()).filter(|p| !candidate.parameters[*p].whole).collect();
+    let mut steps: Vec<f64> = free.iter().map(|p| 0.5 * spacing(candidate, *p, &best.parameters)).collect();
+    for _ in 0..if free.len() > 1 { ROUNDS } else { 1 } {
+        for (p, step) in free.iter().zip(&mut steps) {
+            let (low, high) = candidate.parameters[*p].range;
+            let moved = |to: f64, best: &mut Score| {
+                let mut parameters = best.parameters.clone();
+                parameters[*p] = to.clamp(low, high);
+                let score = at(&parameters)?;
+                let evidence = score.at_best;
+                if evidence > best.at_best {
+                    *best = Score { evidence: best.evidence, ..score };
+                }
+                Some(evidence)
+            };
+            // Parabolas through three points; where there is no summit, the step goes on or shrinks.
+            for _ in 0..if candidate.parameters[*p].smooth { PARABOLAS } else { HALVINGS } {
+                let (x, here) = (best.parameters[*p], best.at_best);
+                let (Some(below), Some(above)) = (moved(x - *step, &mut best), moved(x + *step, &mut best))
+                else {
+                    break;
+                };
+                let bend = below + above - 2.0 * here;
+                if candidate.parameters[*p].smooth && bend < 0.0 {
+                    let shift = (0.5 * *step * (below - above) / bend).clamp(-2.0 * *step, 2.0 * *step);
+                    moved(x + shift, &mut best);
+                    *step = (0.3 * *step).max(0.5 * shift.abs());
+                } else if best.parameters[*p] == x {
+                    *step *= 0.5;
+                }
+            }
+        }
+    }
+    let grown = best.at_best - start;
+    best.evidence += grown;
+    Rival { candidate: rival.candidate, weight: rival.weight + grown, score: best }
+}
+
+/// Distance to the next point of the grid with the same other parameters, or with any.
+fn spacing(candidate: &Candidate, p: usize, at: &[f64]) -> f64 {
+    let near = |alike: bool| {
+        let others = |point: &[f64]| (0..at.len()).all(|k| k == p || point[k] == at[k]);
+        let points = candidate.grid.iter().filter(|point| !alike || others(point));
+        let apart = points.map(|point| (point[p] - at[p]).abs()).filter(|d| *d > 1e-12 * at[p].abs());
+        apart.fold(f64::INFINITY, f64::min)
+    };
+    [near(true), near(false)].into_iter().find(|d| d.is_finite()).unwrap_or(0.0)
+}
