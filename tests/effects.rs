@@ -271,6 +271,23 @@ fn what_recordings_do_not_have_is_told() {
 }
 
 #[test]
+fn what_happens_once_or_goes_on_needs_one_clock() {
+    let (machine, library) = (common::machine("linear_axis"), Library::standard());
+    let skipped = |recordings: &[Recording]| -> BTreeSet<String> {
+        let facts = RecordingFacts::of(&machine, recordings).expect("facts");
+        let skipped = library.candidates(&machine, &facts).skipped;
+        skipped.into_iter().filter(|s| s.reason.contains("one clock")).map(|s| s.effect).collect()
+    };
+    let again = || recording(&machine, 500, true);
+    assert!(skipped(&[again()]).is_empty());
+    let names = skipped(&[again(), again()]);
+    for name in ["setup_slip", "coupling_slip", "sensor_drift", "thermal_drift", "vibration"] {
+        assert!(names.contains(name), "{name}: {names:?}");
+    }
+    assert!(!names.contains("servo_lag") && !names.contains("temperature_drift"), "{names:?}");
+}
+
+#[test]
 fn a_last_digit_that_flickers_at_a_standstill_is_no_reversal() {
     let machine = common::machine("linear_axis");
     let name = &machine.commands()[0];

@@ -184,6 +184,9 @@ const ALIKE: f64 = 0.12;
 const PLAIN: f64 = 0.01;
 /// Names whose odds are no less than this part of the best one's cannot be told from it.
 const ALIAS: f64 = 1.0 / 3.0;
+/// Where shapes take up this part of the structure, or the evidence is no more than this, as many names are wrong as are right.
+const ODDER: f64 = 0.12;
+const SLIGHT: f64 = 100.0;
 /// But no names that are so much rarer, as a logarithm.
 const RARER: f64 = 1.2;
 /// Logarithm of the odds at which a finding is told.
@@ -238,7 +241,7 @@ pub(super) fn report(
         let odds = odds(search, &rivals, own, left.heat.max(search.heat), is_plain);
         let own_odds = odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
         let alike = odds.iter().map(|(_, p, _)| *p).filter(|p| *p >= ALIAS * own_odds);
-        let probability = alike.sum::<f64>().min(1.0);
+        let probability = alike.sum::<f64>().min(1.0) * trust(shares.shapes / total, 2.0 * own.weight);
         let candidate = &search.candidates[effect.candidate];
         let family = &library.families()[candidate.family];
         let departure = (shares.shapes / total).sqrt();
@@ -358,6 +361,13 @@ pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f
     samples.dedup();
     let squares: f64 = rows().map(|row| residual[row] * residual[row]).sum();
     (!samples.is_empty()).then(|| (squares / samples.len() as f64).sqrt())
+}
+
+/// How often a name is right that evidence alone makes certain, on cases whose answers are known: less where shapes take up much
+/// (`shape`, a part of the structure), and where the evidence (`bic`, twice its logarithm) is slight.
+fn trust(shape: f64, bic: f64) -> f64 {
+    let (odd, slight) = ((shape / ODDER).powi(3), (SLIGHT / bic.max(1e-9)).powi(2));
+    1.0 / ((1.0 + odd) * (1.0 + slight))
 }
 
 /// Probability of every rival, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.

@@ -61,8 +61,8 @@ pub(super) struct Score {
 const ROOM: f64 = 4.0;
 const ROOM_BEYOND: f64 = 2.0;
 
-/// Columns that are built at a time.
-const BATCH: usize = 192;
+/// Numbers of columns that are built at a time: they stay in a core's cache.
+const BATCH: usize = 1 << 19;
 
 impl<'a> Rows<'a> {
     pub fn new(linear: &'a Linear, coarse: &'a Coarse, whitener: Whitener) -> Self {
@@ -242,7 +242,7 @@ impl<'a> Rows<'a> {
             Some(_) => (&field.coarse_space, &field.coarse_left),
             None => (&*field.space, &field.left),
         };
-        for batch in points.chunks((BATCH / k).max(1)) {
+        for batch in points.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
             let mut built = Vec::new();
             for i in batch {
