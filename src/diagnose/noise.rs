@@ -43,6 +43,8 @@ const AROUND: usize = 15;
 const FINEST: f64 = 1e-10;
 /// Two estimates of the memory that differ by less tell of the same noise.
 const ALIKE: f64 = 0.1;
+/// Noise that remembers less than this is as good as white.
+const FORGETFUL: f64 = 0.2;
 /// Longest memory that is told from a drift.
 const MOST_RHO: f64 = 0.97;
 
@@ -320,6 +322,11 @@ impl Whitener {
     /// The row that the noise of this one remembers, and how much of it.
     pub fn memory(&self, row: usize) -> Option<(usize, f64)> {
         (self.previous[row] != NONE).then(|| (self.previous[row] as usize, self.rho[row]))
+    }
+
+    /// Whether the noise of many rows remembers the one before.
+    pub fn remembers(&self) -> bool {
+        self.rho.iter().filter(|rho| **rho > FORGETFUL).count() > self.rho.len() / 10
     }
 
     /// How many rows count.

@@ -208,7 +208,15 @@ impl<'a> Rows<'a> {
         }
         let kept = self.coarse.features(i, candidate, &self.linear.samples);
         self.table(candidate, &candidate.grid, field, kept, heat, &all, &mut table);
-        summary(&candidate.grid, &table, &all)
+        let rough = summary(&candidate.grid, &table, &all)?;
+        // White rows of noise that remembers are differences: what jumps is in a single one, and drowns in its block.
+        match kept.is_some() && self.whitener.remembers() {
+            true => {
+                let fine = self.score_at(candidate, &rough.parameters, field, heat)?;
+                Some(Score { evidence: rough.evidence + fine.at_best - rough.at_best, ..fine })
+            }
+            false => Some(rough),
+        }
     }
 
     /// Evidence at a single point, finely.
