@@ -184,9 +184,11 @@ const ALIKE: f64 = 0.12;
 const PLAIN: f64 = 0.01;
 /// Names whose odds are no less than this part of the best one's cannot be told from it.
 const ALIAS: f64 = 1.0 / 3.0;
-/// Where shapes take up this part of the structure, or the evidence is no more than this, as many names are wrong as are right.
+/// Trust in names falls where shapes take up more than this part of the structure, to this at least, and by half where the evidence is
+/// no more than this.
 const ODDER: f64 = 0.12;
-const SLIGHT: f64 = 100.0;
+const LEAST: f64 = 0.55;
+const SLIGHT: f64 = 30.0;
 /// But no names that are so much rarer, as a logarithm.
 const RARER: f64 = 1.2;
 /// Logarithm of the odds at which a finding is told.
@@ -367,7 +369,7 @@ pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f
 /// (`shape`, a part of the structure), and where the evidence (`bic`, twice its logarithm) is slight.
 fn trust(shape: f64, bic: f64) -> f64 {
     let (odd, slight) = ((shape / ODDER).powi(3), (SLIGHT / bic.max(1e-9)).powi(2));
-    1.0 / ((1.0 + odd) * (1.0 + slight))
+    (LEAST + (1.0 - LEAST) / (1.0 + odd)) / (1.0 + slight)
 }
 
 /// Probability of every rival, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.
