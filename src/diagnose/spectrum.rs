@@ -73,7 +73,7 @@ impl Spectrum {
 /// The next length that is a power of two or three times one.
 fn fast(least: usize) -> usize {
     let two = least.next_power_of_two();
-    if two % 4 == 0 && 3 * (two / 4) >= least { 3 * (two / 4) } else { two }
+    if two.is_multiple_of(4) && 3 * (two / 4) >= least { 3 * (two / 4) } else { two }
 }
 
 #[cfg(test)]
