@@ -11,7 +11,7 @@ use super::search::{Active, Rival, Search, VISIBLE, all_but};
 use super::stretch::{Where, wheres};
 use super::traces::{self, Traces};
 use super::unexplained::{self, Unexplained};
-use crate::effects::{Identified, Library, StoredEffect, in_words};
+use crate::effects::{Identified, Library, Place, StoredEffect, in_words};
 use crate::feature::Dimension;
 use crate::identify::BeforeAfter;
 use crate::location::LocationErrors;
@@ -416,7 +416,14 @@ fn confusable(
     Confusable {
         effect: candidate.effect.clone(),
         separate_by: told.map_or_else(
-            || format!("a path on which {at} moves on its own, to and fro over all of its travel"),
+            || match candidate.place {
+                Place::Joint(_) | Place::Pair(..) => {
+                    format!("a path on which {at} moves on its own, to and fro over all of its travel")
+                }
+                Place::Frame(_) | Place::Measurement => {
+                    "the same path again, in another order and at another speed".into()
+                }
+            },
             |l| l.separate_by.replace("{at}", &at),
         ),
         at,
