@@ -19,7 +19,8 @@ mod scan;
 pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Place, Skipped, Slot};
 pub use facts::RecordingFacts;
 pub use family::{
-    Directions, Family, Grid, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat, Size,
+    Clock, Directions, Family, Grid, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat,
+    Size, Which,
 };
 pub use identified::{BoundPart, Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
 pub use library::{Library, LibraryFault};

@@ -14,6 +14,7 @@ mod bind;
 mod check;
 mod dimension;
 mod evaluate;
+mod express;
 mod expression;
 mod formula;
 mod samples;

@@ -226,8 +226,9 @@ fn is_of_setup(block: &Block) -> bool {
     !block.prior && !matches!(block.role, Role::Term(_))
 }
 
-/// Finds again only what belongs to the set-up of `recordings`: frame `w`, unknown tool points, zeros and lengths. The machine
-/// stays as it is calibrated.
+/// Finds again only what belongs to the set-up of `recordings`: frame `w`, unknown tool points, zeros and lengths, and of effects
+/// that belong to where the machine stands ([`crate::effects::StoredEffect::of_setup`]) their coefficients there. The machine stays
+/// as it is calibrated.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -245,6 +246,7 @@ fn attempt_setup(
     loss: Loss,
     frames: Option<&[Pose<f64>]>,
 ) -> Result<(CalibratedMachine, Frames)> {
+    let calibrated = &calibrated.for_setups_of(recordings);
     let (machine, (variation, _)) = (calibrated.machine(), calibrated.variation_in(recordings));
     let varying = &variation.varying;
     let dead_bands: Vec<_> = variation.dead_bands.iter().map(|band| Some(*band)).collect();
@@ -256,8 +258,9 @@ fn attempt_setup(
     (start.parts, start.coefficients) = (variation.parts.clone(), variation.coefficients.clone());
     start.dh[machine.w_index()] = Twist::zero(0.0);
     let hangs = turn_gravity(machine, &mut sources, &layout, start.clone(), frames)?;
-    let mut problem = Problem::new(machine, &sources, &layout, varying, |block| {
-        !matches!(block.role, Role::Dyad(_) | Role::Part { .. } | Role::Term(_))
+    let mut problem = Problem::new(machine, &sources, &layout, varying, |block| match block.role {
+        Role::Term(i) => varying.terms[i].of_setup,
+        role => !matches!(role, Role::Dyad(_) | Role::Part { .. }),
     });
     problem.loss = loss;
     let Placed { solution: placed, noise, .. } = place(&mut problem, start)?;
@@ -265,6 +268,8 @@ fn attempt_setup(
     let mut fitted = calibrated.clone();
     let unknowns = &found.solution.unknowns;
     put_setups(&mut fitted, &sources, unknowns);
+    let terms = varying.terms.iter().zip(&unknowns.coefficients).filter(|(term, _)| term.of_setup);
+    fitted.put_terms_of_setups(&terms.map(|(_, value)| *value).collect::<Vec<_>>());
     Ok((fitted, hangs.then(|| upright::frames(unknowns))))
 }
 

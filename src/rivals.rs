@@ -165,7 +165,7 @@ fn backlash(machine: &Machine) -> Varying {
     let term = |(j, _): (usize, usize)| {
         let direction = machine.dyads()[j].joint.as_ref().map_or(Twist::zero(0.0), |joint| joint.twist());
         let part = Part { slot: Slot::Before(j), direction, feature: Feature::half_direction(j) };
-        Term { parts: vec![part], scale: machine.tolerance(j).rotation, prior: true }
+        Term { parts: vec![part], scale: machine.tolerance(j).rotation, prior: true, of_setup: false }
     };
     Varying { directions: None, terms: rotary(machine).into_iter().map(term).collect() }
 }

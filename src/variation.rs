@@ -39,6 +39,8 @@ pub struct Term {
     pub scale: f64,
     /// Whether there is a prior on it.
     pub prior: bool,
+    /// Whether it belongs to a set-up, and is found again with that.
+    pub of_setup: bool,
 }
 
 /// Everything that deviations depend on besides being constant, without values.

@@ -43,7 +43,7 @@ fn varying(machine: &Machine, kind: Kind) -> Varying {
 fn play(machine: &Machine, name: &str) -> Term {
     let (j, joint) = machine.joints().find(|(_, joint)| joint.name == name).expect("a joint");
     let part = Part { slot: Slot::Before(j), direction: joint.twist(), feature: Feature::half_direction(j) };
-    Term { parts: vec![part], scale: 1e-4, prior: false }
+    Term { parts: vec![part], scale: 1e-4, prior: false, of_setup: false }
 }
 
 fn identify(

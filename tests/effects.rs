@@ -162,7 +162,7 @@ fn every_family_is_finite_at_every_place_of_every_machine() {
     }
     // A recording of a few seconds is too short for what takes eight hours, and its samples are too far apart for a grating.
     let missing: Vec<&str> = library.names().into_iter().filter(|n| !seen.contains(*n)).collect();
-    assert_eq!(missing, ["interpolation_error", "daily_drift"]);
+    assert_eq!(missing, ["interpolation_error", "homing_error", "daily_drift", "remounting_error"]);
 }
 
 #[test]

@@ -35,6 +35,7 @@ fn feature(machine: &Machine, text: &str, parameters: &[&str]) -> Feature {
         partner: None,
         travel: &travel,
         time: Some((0.0, 1.0)),
+        begins: &[],
         parameters: &parameters,
     };
     Feature::bind(&expression, &binding).unwrap_or_else(|e| panic!("{text}: {e}"))

@@ -243,6 +243,7 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
             parts: vec![Part { slot, direction, feature }],
             scale: 1e-4,
             prior: false,
+            of_setup: false,
         };
         let terms = vec![
             part(Slot::Before(j), joint.twist(), Feature::half_direction(j)),

@@ -87,7 +87,7 @@ fn terms(set: &Set, library: &Library, asked: &str) -> (Varying, Vec<String>) {
                 });
                 let room = if set.machine.commands().len() == 1 { ROOM_ALONE } else { ROOM };
                 let scale = room * coefficient.size / rms;
-                varying.terms.push(Term { parts: parts.collect(), scale, prior: true });
+                varying.terms.push(Term { parts: parts.collect(), scale, prior: true, of_setup: false });
                 names.push(format!(
                     "{}@{} {}.{} (rms {rms:.3e}, size {:.1e})",
                     candidate.effect,

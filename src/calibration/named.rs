@@ -2,8 +2,8 @@
 
 use super::pieces::{command, unit, unknown};
 use super::{AxisForm, CalibratedMachine, CalibrationForm, checked};
-use crate::effects::{Slot as Seat, StoredEffect};
-use crate::feature::{Feature, Unbound};
+use crate::effects::{Slot as Seat, StoredEffect, StoredTerm};
+use crate::feature::{Expression, Feature, Unbound};
 use crate::machine::{Machine, MachineFault};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
@@ -105,6 +105,69 @@ impl CalibratedMachine {
         self.variation_without(|effect, features| recordings.iter().find_map(|r| not_in(r, effect, features)))
     }
 
+    /// The machine with terms of their own, 0 as yet, for the set-ups of these recordings, of every effect that belongs to where the
+    /// machine stands: [`Term::of_setup`] is set on these alone. Their prior is as wide as what other set-ups had.
+    pub(crate) fn for_setups_of(&self, recordings: &[Recording]) -> Self {
+        let mut own = self.clone();
+        if self.effects.iter().all(|effect| !effect.of_setup) {
+            return own;
+        }
+        let mut setups: Vec<(&str, Vec<String>)> = Vec::new();
+        for recording in recordings {
+            let (setup, name) = (recording.header().setup.as_str(), recording.name().to_string());
+            match setups.iter_mut().find(|(known, _)| *known == setup) {
+                Some((_, names)) => names.push(name),
+                None => setups.push((setup, vec![name])),
+            }
+        }
+        let terms = own.variation.varying.terms.len() - own.effects.iter().map(|e| e.terms.len()).sum::<usize>();
+        own.variation.varying.terms.truncate(terms);
+        own.variation.coefficients.truncate(terms);
+        for effect in std::mem::take(&mut own.effects) {
+            let (known, shapes) = if effect.of_setup {
+                apart(&effect, recordings)
+            } else {
+                (effect.terms.clone(), Vec::new())
+            };
+            let fixed = known.len();
+            let mut effect = StoredEffect { terms: known, ..effect };
+            let mut scales = Vec::new();
+            for (shape, scale) in shapes {
+                for (_, names) in &setups {
+                    let mut term = shape.clone();
+                    for part in &mut term.parts {
+                        part.feature = Expression::Only(names.clone(), Box::new(part.feature.clone()));
+                    }
+                    effect.terms.push(term);
+                    scales.push(scale);
+                }
+            }
+            let from = own.variation.varying.terms.len() + fixed;
+            // What stood in the file binds again.
+            if own.add_effect(effect).is_err() {
+                return self.clone();
+            }
+            for (term, scale) in own.variation.varying.terms[from..].iter_mut().zip(scales) {
+                *term = Term { scale, prior: true, of_setup: true, ..term.clone() };
+            }
+        }
+        own
+    }
+
+    /// The coefficients of the terms that [`CalibratedMachine::for_setups_of`] has added, in their order.
+    pub(crate) fn put_terms_of_setups(&mut self, values: &[f64]) {
+        let mut values = values.iter();
+        let all = self.variation.varying.terms.len();
+        let skipped = all - self.effects.iter().map(|e| e.terms.len()).sum::<usize>();
+        let named = self.effects.iter_mut().flat_map(|effect| &mut effect.terms);
+        let terms = self.variation.varying.terms.iter().zip(&mut self.variation.coefficients).skip(skipped);
+        for ((_, coefficient), stored) in terms.zip(named).filter(|((term, _), _)| term.of_setup) {
+            if let Some(value) = values.next() {
+                (*coefficient, stored.value) = (*value, *value);
+            }
+        }
+    }
+
     pub(super) fn dead_band_forms(&self) -> Vec<AxisForm> {
         if self.effects.is_empty() {
             return Vec::new();
@@ -148,11 +211,46 @@ impl CalibratedMachine {
     }
 }
 
+/// The terms of an effect for set-ups that are none of these recordings', and one of each shape with the root mean square of its
+/// coefficients over all set-ups.
+fn apart(effect: &StoredEffect, recordings: &[Recording]) -> (Vec<StoredTerm>, Vec<(StoredTerm, f64)>) {
+    let is_here = |e: &Expression| match e {
+        Expression::Only(names, _) => recordings.iter().any(|r| names.iter().any(|name| name == r.name())),
+        _ => false,
+    };
+    let bare = |term: &StoredTerm| {
+        let mut bare = StoredTerm { value: 0.0, std_error: None, ..term.clone() };
+        for part in &mut bare.parts {
+            if let Expression::Only(_, e) = &part.feature {
+                part.feature = (**e).clone();
+            }
+        }
+        bare
+    };
+    let mut shapes: Vec<(StoredTerm, Vec<f64>)> = Vec::new();
+    for term in &effect.terms {
+        let own = bare(term);
+        match shapes.iter_mut().find(|(shape, _)| *shape == own) {
+            Some((_, values)) => values.push(term.value),
+            None => shapes.push((own, vec![term.value])),
+        }
+    }
+    let known = effect.terms.iter().filter(|t| !t.parts.iter().any(|p| is_here(&p.feature))).cloned().collect();
+    let rms = |values: Vec<f64>| {
+        let squares = values.iter().map(|v| v * v).sum::<f64>();
+        (squares / values.len() as f64).sqrt().max(f64::MIN_POSITIVE)
+    };
+    (known, shapes.into_iter().map(|(shape, values)| (shape, rms(values))).collect())
+}
+
 /// Why an effect cannot be used in a recording.
 fn not_in(recording: &Recording, effect: &StoredEffect, features: &[&Feature]) -> Option<String> {
     let kind = Sensor::of(recording.header()).name();
     if let Some(own) = effect.instrument.as_ref().filter(|own| *own != kind) {
         return Some(format!("it belongs to the instrument of the {own}, and {kind} was measured"));
+    }
+    if effect.of_setup && !features.iter().any(|f| f.is_of(recording.name())) {
+        return Some("it belongs to where the machine stood, and this is another set-up: --fit-setup finds it".into());
     }
     if !recording.has_time() && features.iter().any(|f| f.needs_time() || f.needs_rates()) {
         return Some("the recording has no time column `t`".into());
@@ -186,7 +284,7 @@ pub(crate) fn terms(machine: &Machine, effect: &StoredEffect) -> Result<Vec<(f64
     };
     let term = |(value, parts): (f64, Vec<crate::effects::BoundPart>)| {
         let parts = parts.into_iter().flat_map(part).collect();
-        (value, Term { parts, scale: value.abs().max(f64::MIN_POSITIVE), prior: false })
+        (value, Term { parts, scale: value.abs().max(f64::MIN_POSITIVE), prior: false, of_setup: false })
     };
     Ok(effect.bind(machine)?.into_iter().map(term).collect())
 }

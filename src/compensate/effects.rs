@@ -42,7 +42,7 @@ impl<'a> Effects<'a> {
         let gone = |effect: &str, at: &str| left_out.iter().any(|l| l.effect == effect && l.at == at);
         let mut held = Vec::new();
         calibrated.variation_without(|effect, features| {
-            if features.iter().any(|f| f.needs_time()) && !gone(&effect.effect, &effect.at) {
+            if features.iter().any(|f| f.needs_moment()) && !gone(&effect.effect, &effect.at) {
                 held.push(LeftOut {
                     effect: effect.effect.clone(),
                     at: effect.at.clone(),
@@ -111,6 +111,9 @@ fn unknown_to_programs(
 ) -> Option<String> {
     if effect.at == "measurement" {
         return Some("it belongs to the measurement, not to the machine".into());
+    }
+    if effect.of_setup {
+        return Some("it belongs to where the machine stood when it was measured".into());
     }
     if features.iter().any(|f| f.needs_rates()) {
         return Some("it depends on velocity or acceleration, and a program's feeds are no clock".into());

@@ -146,7 +146,8 @@ impl Model {
             }
             0.5 * (inside + outside)
         };
-        let (low, high) = (edge(parameter.range.0), edge(parameter.range.1));
+        let range = parameter.range_around(at[p]);
+        let (low, high) = (edge(range.0), edge(range.1));
         Some((0.5 * (low + high), (high - low) / 12f64.sqrt()))
     }
 }

@@ -2,12 +2,15 @@
 
 use super::score::{Field, Rows, Score};
 use super::search::Rival;
-use crate::effects::Candidate;
+use crate::effects::{Candidate, Parameter};
 
 /// Rounds over several parameters; parabolas, or halvings of a step where nothing is smooth, for each of them.
 const ROUNDS: usize = 2;
 const PARABOLAS: usize = 3;
 const HALVINGS: usize = 9;
+
+/// Weight of what cannot be.
+const NEVER: f64 = -1e6;
 
 /// Moves the parameters between the points of the grid to where the evidence is greatest, from every point that may lead there.
 pub(super) fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
@@ -33,7 +36,7 @@ fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, hea
     let mut steps: Vec<f64> = free.iter().map(|p| 0.5 * spacing(candidate, *p, &best.parameters)).collect();
     for _ in 0..if free.len() > 1 { ROUNDS } else { 1 } {
         for (p, step) in free.iter().zip(&mut steps) {
-            let (low, high) = candidate.parameters[*p].range;
+            let (low, high) = candidate.parameters[*p].range_around(rival.score.parameters[*p]);
             let moved = |to: f64, best: &mut Score| {
                 let mut parameters = best.parameters.clone();
                 parameters[*p] = to.clamp(low, high);
@@ -61,6 +64,13 @@ fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, hea
                 }
             }
         }
+    }
+    // Nothing has its best moment where a recording begins or ends: what differs there is the recording.
+    let ends = |(p, parameter): (&f64, &Parameter)| {
+        parameter.pieces.iter().any(|(from, to)| (p - from).abs() < 1.0 || (p - to).abs() < 1.0)
+    };
+    if best.parameters.iter().zip(&candidate.parameters).any(ends) {
+        return Rival { weight: NEVER, ..rival.clone() };
     }
     let grown = best.at_best - start;
     best.evidence += grown;

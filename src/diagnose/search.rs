@@ -16,6 +16,7 @@ use super::score::{Field, Rows, Score};
 use super::shape;
 use super::space::Space;
 use crate::effects::Candidate;
+use crate::feature::Feature;
 
 /// An effect that has been taken in.
 #[derive(Clone)]
@@ -382,7 +383,7 @@ impl Search<'_> {
     /// both go by the clock.
     fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
-        let timed = |candidate: usize| self.candidates[candidate].features.iter().any(|f| f.needs_time());
+        let timed = |candidate: usize| self.candidates[candidate].features.iter().any(Feature::needs_moment);
         let share = |effect: &Active| {
             if place(effect.candidate) == place(rival.candidate) {
                 OWN_SHAPE

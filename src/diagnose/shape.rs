@@ -107,7 +107,7 @@ pub(super) fn is_of_curve(curve: &Candidate, other: &Candidate) -> bool {
 fn is_along_travel(candidate: &Candidate) -> bool {
     !candidate.features.is_empty()
         && candidate.features.iter().all(|f| {
-            !(f.needs_history() || f.needs_rates() || f.needs_gravity() || f.needs_time())
+            !(f.needs_history() || f.needs_rates() || f.needs_gravity() || f.needs_moment())
                 && f.channels().is_empty()
                 && f.wave().is_none()
                 && f.joints().len() == 1
@@ -158,7 +158,7 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64
         any(&Feature::needs_history),
         any(&Feature::needs_rates),
         any(&Feature::needs_gravity),
-        any(&Feature::needs_time),
+        any(&Feature::needs_moment),
     );
     // Overtones of a wave.
     for pair in features.chunks(2) {

@@ -1,7 +1,7 @@
 //! Families on one machine with given recordings: candidates with everything resolved.
 
 use super::facts::RecordingFacts;
-use super::family::{Directions, Family, Grid, Partner, Pivot, Seat};
+use super::family::{Clock, Directions, Family, Grid, Partner, Pivot, Range, Seat, Which};
 use super::grid;
 use super::library::Library;
 use crate::feature::{Binding, Dimension, Expression, Feature, Scope, Unbound, dimension_of};
@@ -102,10 +102,20 @@ pub struct Parameter {
     pub dimension: Dimension,
     /// Least and greatest value that make sense, SI.
     pub range: (f64, f64),
+    /// Where there are gaps between them, what lies between the gaps.
+    pub pieces: Vec<(f64, f64)>,
     /// Whether the features' derivatives by it say how they change. Else (whole numbers, moments of a step) only the grid does.
     pub smooth: bool,
     /// Whether only whole numbers come into question.
     pub whole: bool,
+}
+
+impl Parameter {
+    /// The range, or the piece of it that a value lies in.
+    pub fn range_around(&self, value: f64) -> (f64, f64) {
+        let piece = self.pieces.iter().find(|(from, to)| (*from..=*to).contains(&value));
+        piece.copied().unwrap_or(self.range)
+    }
 }
 
 /// A family at one place: columns of a regression, `docs/effects.md` (40).
@@ -183,7 +193,13 @@ impl Library {
 fn places(family: &Family, machine: &Machine) -> Vec<Place> {
     let mut places = Vec::new();
     let sits = |kind: JointKind| family.sits.iter().any(|seat| seat.joint() == Some(kind));
-    for (j, _) in machine.joints().filter(|(_, joint)| sits(joint.kind)) {
+    let along = |j: usize, k: usize| machine.branch(k) == machine.branch(j);
+    let here = |j: usize| match family.which {
+        Which::All => true,
+        Which::First => machine.joints().all(|(k, _)| k >= j || !along(j, k)),
+        Which::Last => (j + 1..machine.dyads().len()).all(|k| !along(j, k)),
+    };
+    for (j, _) in machine.joints().filter(|(j, joint)| sits(joint.kind) && here(*j)) {
         let Some(partner) = family.partner else {
             places.push(Place::Joint(j));
             continue;
@@ -198,7 +214,7 @@ fn places(family: &Family, machine: &Machine) -> Vec<Place> {
         );
     }
     if family.sits.contains(&Seat::Frame) {
-        places.extend((0..machine.dyads().len()).map(Place::Frame));
+        places.extend((0..machine.dyads().len()).filter(|j| here(*j)).map(Place::Frame));
     }
     if family.sits.contains(&Seat::Measurement) {
         places.push(Place::Measurement);
@@ -233,8 +249,16 @@ fn candidate(
             ));
         }
     }
-    if family.one_clock && !facts.one_clock {
-        return Err(grid::MANY_CLOCKS.into());
+    match family.clock {
+        Clock::One if facts.time.is_some() && !facts.one_clock => return Err(grid::MANY_CLOCKS.into()),
+        Clock::None | Clock::NoneOfSeveral if facts.one_clock => {
+            return Err("the recordings' clock says what came first".into());
+        }
+        Clock::NoneOfSeveral if facts.begins.len() == 1 => return Err("there is one recording".into()),
+        Clock::None | Clock::NoneOfSeveral if facts.begins.is_empty() => {
+            return Err("two recordings have one name, and nothing says which came first".into());
+        }
+        _ => {}
     }
     if family.needs_masses && !own.is_some_and(|j| has_masses(machine, j)) {
         return Err("the machine file states no masses beyond the joint".into());
@@ -243,8 +267,15 @@ fn candidate(
     let own_kind = own.and_then(kind);
     let travel = own.and_then(|j| facts.travel[j]);
     let names: Vec<String> = family.parameters.iter().map(|p| p.name.clone()).collect();
-    let binding =
-        |own| Binding { machine, own, partner, travel: &facts.travel, time: facts.time, parameters: &names };
+    let binding = |own| Binding {
+        machine,
+        own,
+        partner,
+        travel: &facts.travel,
+        time: facts.time,
+        begins: &facts.begins,
+        parameters: &names,
+    };
     let bind = |expression: &Expression, own| {
         Feature::bind(expression, &binding(own)).map_err(|e| e.to_string()).and_then(|f| has_all(f, facts))
     };
@@ -327,6 +358,9 @@ fn candidate(
             });
         }
     }
+    if family.each_setup {
+        (features, coefficients) = in_each_setup(&features, &coefficients, facts)?;
+    }
     if coefficients.is_empty() && family.scatter.is_none() {
         return Err("the instrument reads nothing that it could change".into());
     }
@@ -342,6 +376,7 @@ fn candidate(
             name: form.name.clone(),
             dimension: form.dimension(own_kind).unwrap_or(Dimension::ONE),
             range: *range,
+            pieces: if form.range == Range::Order { grid::insides(facts) } else { Vec::new() },
             whole: whole(i),
             smooth: !whole(i) && features.iter().all(|f| f.is_smooth_in(i)),
         })
@@ -358,6 +393,35 @@ fn candidate(
         least: family.least.unwrap_or(family.features.len()).min(own_features.len()),
         often: family.often,
     })
+}
+
+/// Features and coefficients anew for each set-up, 0 in the others.
+fn in_each_setup(
+    features: &[Feature],
+    coefficients: &[Coefficient],
+    facts: &RecordingFacts,
+) -> Result<(Vec<Feature>, Vec<Coefficient>), String> {
+    if facts.setups.len() < 2 && features.iter().all(|f| *f == Feature::one()) {
+        return Err("there is one set-up".into());
+    }
+    if facts.begins.is_empty() {
+        return Err("two recordings have one name, and nothing says which set-up is meant".into());
+    }
+    let (mut own_features, mut own_coefficients) = (Vec::new(), Vec::new());
+    for coefficient in coefficients {
+        for (s, (setup, _)) in facts.setups.iter().enumerate() {
+            let mut own = coefficient.clone();
+            own.parts.iter_mut().for_each(|part| part.feature += s * features.len());
+            if facts.setups.len() > 1 {
+                own.direction = format!("{}@{setup}", own.direction);
+            }
+            own_coefficients.push(own);
+        }
+    }
+    for (_, recordings) in &facts.setups {
+        own_features.extend(features.iter().map(|feature| feature.only_in(recordings)));
+    }
+    Ok((own_features, own_coefficients))
 }
 
 /// Whether the joint of dyad `j` carries masses that the machine file states.

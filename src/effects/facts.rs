@@ -19,8 +19,14 @@ pub struct RecordingFacts {
     pub places: Vec<Option<usize>>,
     /// First and last time, s, if all recordings have one.
     pub time: Option<(f64, f64)>,
-    /// Whether the recordings follow one another on one clock: times that overlap are of clocks of their own.
+    /// Whether the recordings have times and follow one another on one clock: times that overlap are of clocks of their own.
     pub one_clock: bool,
+    /// Names of the recordings in their order, and how many samples come before each; empty where two have one name.
+    pub begins: Vec<(String, f64)>,
+    /// Set-ups in their order, with the names of their recordings.
+    pub setups: Vec<(String, Vec<String>)>,
+    /// How many samples there are.
+    pub samples: f64,
     /// Duration of the longest recording, s.
     pub longest: f64,
     /// Median time from a sample to the next in the recording where it is smallest, s.
@@ -68,6 +74,9 @@ impl RecordingFacts {
             places: vec![None; dyads],
             time: None,
             one_clock: true,
+            begins: Vec::new(),
+            setups: Vec::new(),
+            samples: 0.0,
             longest: 0.0,
             step: None,
             settled: false,
@@ -80,7 +89,9 @@ impl RecordingFacts {
         let mut seen: Vec<Vec<f64>> = vec![Vec::new(); dyads];
         for (i, recording) in recordings.iter().enumerate() {
             all_timed &= recording.has_time();
+            facts.begins.push((recording.name().to_string(), facts.samples));
             spans.extend(facts.take(machine, recording, &mut seen)?);
+            facts.take_setup(recording);
             let channels = recording.extra_channels().iter().map(|c| (c.name.clone(), c.unit.quantity));
             match i {
                 0 => facts.channels = channels.collect(),
@@ -98,7 +109,11 @@ impl RecordingFacts {
             (facts.time, facts.step, facts.longest) = (None, None, 0.0);
         }
         spans.sort_by(|a, b| a.0.total_cmp(&b.0));
-        facts.one_clock = spans.windows(2).all(|pair| pair[0].1 <= pair[1].0);
+        facts.one_clock = all_timed && spans.windows(2).all(|pair| pair[0].1 <= pair[1].0);
+        let twice = |name: &String| facts.begins.iter().filter(|(other, _)| other == name).count() > 1;
+        if facts.begins.iter().any(|(name, _)| twice(name)) {
+            facts.begins.clear();
+        }
         for (j, positions) in seen.into_iter().enumerate() {
             facts.places[j] = facts.travel[j].and_then(|travel| places(&positions, travel));
             facts.spacing[j] = facts.travel[j].map_or(0.0, |travel| spacing(positions, travel));
@@ -108,6 +123,14 @@ impl RecordingFacts {
             *band = (1.5 * *band).max(JITTER.0 * range).min(JITTER.1 * range);
         }
         Ok(facts)
+    }
+
+    fn take_setup(&mut self, recording: &Recording) {
+        let (setup, name) = (&recording.header().setup, recording.name().to_string());
+        match self.setups.iter_mut().find(|(known, _)| known == setup) {
+            Some((_, recordings)) => recordings.push(name),
+            None => self.setups.push((setup.clone(), vec![name])),
+        }
     }
 
     /// Takes a recording in; its first and last time, if it has any.
@@ -123,6 +146,7 @@ impl RecordingFacts {
         let mut span: Option<(f64, f64)> = None;
         for chunk in recording.chunks()? {
             let chunk = chunk?;
+            self.samples += chunk.len as f64;
             let mut last: Option<Vec<f64>> = None; // rows of a chunk; a step from one chunk to the next is left out
             for (k, q) in chunk.commands.chunks_exact(commands).enumerate() {
                 let displacements = machine.displacements(q);

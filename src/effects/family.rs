@@ -46,9 +46,15 @@ pub struct Family {
     /// Tried only where the recordings last this long, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lasts: Option<f64>,
-    /// Goes on from one recording to the next: tried only where they follow one another on one clock.
+    /// Tried only where the recordings' clocks are such.
     #[serde(default)]
-    pub one_clock: bool,
+    pub clock: Clock,
+    /// Has coefficients of its own in every set-up: it belongs to where the machine stands, not to the machine.
+    #[serde(default)]
+    pub each_setup: bool,
+    /// Which places of a branch come into question.
+    #[serde(default)]
+    pub which: Which,
     /// Tried only where the machine file states masses beyond the joint.
     #[serde(default)]
     pub needs_masses: bool,
@@ -100,6 +106,32 @@ pub enum Partner {
     Revolute,
     /// Any other joint.
     Joint,
+}
+
+/// Places along a branch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Which {
+    /// All of them.
+    #[default]
+    All,
+    /// The first, which carries all others.
+    First,
+    /// The last, which carries no other.
+    Last,
+}
+
+/// How time runs through the recordings of a call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Clock {
+    /// No matter.
+    #[default]
+    Any,
+    /// They follow one another on one clock, as what goes on from one to the next needs.
+    One,
+    /// They have no time, or clocks of their own: only the order of samples says what came first.
+    None,
+    /// The same, and there are several of them, so that something may end with its recording.
+    NoneOfSeveral,
 }
 
 /// Which side of the joint a deviation stands on.
@@ -168,6 +200,8 @@ pub enum Range {
     Travel,
     /// The time seen.
     Time,
+    /// The samples counted.
+    Order,
 }
 
 /// Which values of a parameter are tried. Neighbours must look alike: their columns correlate by 0.9 or more.

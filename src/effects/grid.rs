@@ -5,6 +5,8 @@ use super::family::{Grid, ParameterForm, Range};
 use crate::feature::Dimension;
 use crate::machine::JointKind;
 
+/// Part of a recording at its beginning and its end in which no slip is looked for.
+const EDGE: f64 = 0.05;
 /// More points than this are cut short, evenly: a grid that large is a mistake of the library.
 const MOST_POINTS: usize = 200_000;
 
@@ -25,7 +27,8 @@ pub(super) fn range(
             }
             Ok((from, to))
         }
-        Range::Time if !facts.one_clock => Err(MANY_CLOCKS.into()),
+        Range::Order => Ok((0.0, facts.samples)),
+        Range::Time if facts.time.is_some() && !facts.one_clock => Err(MANY_CLOCKS.into()),
         Range::Time => facts.time.ok_or_else(|| NO_TIME.into()).map(|(from, to)| (0.0, to - from)),
         Range::ByKind | Range::Between(..) => {
             let (from, to, dimension) = form.stated(own).ok_or("no range is given for this kind of place")?;
@@ -102,6 +105,7 @@ pub(super) fn points(
         let mut finer = Vec::new();
         for point in &points {
             let values = match &forms[i].grid {
+                Grid::Parts(parts) if forms[i].range == Range::Order => orders(*parts, facts),
                 Grid::Logarithmic(ratio) => logarithmic(from, to, *ratio),
                 Grid::Parts(parts) => even(from, to, *parts),
                 Grid::Whole => whole(from, to),
@@ -147,6 +151,29 @@ fn even(from: f64, to: f64, parts: usize) -> Vec<f64> {
         return vec![from];
     }
     (0..=parts).map(|i| from + (to - from) * i as f64 / parts as f64).collect()
+}
+
+/// Numbers of samples inside every recording, away from where it begins and ends: there nothing has a before and an after.
+pub(super) fn insides(facts: &RecordingFacts) -> Vec<(f64, f64)> {
+    let ends = facts.begins.iter().skip(1).map(|(_, n)| *n).chain([facts.samples]);
+    let inside = |from: f64, to: f64| {
+        let edge = (EDGE * (to - from)).max(2.0);
+        (from + edge, to - edge)
+    };
+    let all = facts.begins.iter().map(|(_, n)| *n).zip(ends).map(|(from, to)| inside(from, to));
+    all.filter(|(from, to)| to > from).collect()
+}
+
+/// Numbers of samples in all recordings, about as many as parts.
+fn orders(parts: usize, facts: &RecordingFacts) -> Vec<f64> {
+    let inner = insides(facts).into_iter().flat_map(|(from, to)| {
+        let own = (parts as f64 * (to - from) / facts.samples).ceil().max(8.0);
+        // Between two samples, so that no rounding decides.
+        even(from, to, own as usize).into_iter().map(move |n| (n.floor() + 0.5).min(to))
+    });
+    let mut points: Vec<f64> = inner.collect();
+    points.dedup();
+    points
 }
 
 fn logarithmic(from: f64, to: f64, ratio: f64) -> Vec<f64> {

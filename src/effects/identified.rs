@@ -203,7 +203,7 @@ impl Identified<'_> {
             Meaning::Curve => {
                 for (coefficient, value) in found.iter().zip(c) {
                     let direction = &coefficient.direction;
-                    let dot = if direction.is_empty() { "" } else { "_" };
+                    let dot = if direction.is_empty() || direction.starts_with('@') { "" } else { "_" };
                     rows.push((
                         format!("c{}{dot}{direction}", coefficient.order),
                         coefficient.dimension,
@@ -303,6 +303,7 @@ impl Identified<'_> {
             with: self.candidate.place.partner(machine),
             says: self.sentence(machine, sizes),
             instrument: None,
+            of_setup: self.family.each_setup,
             sizes: sizes.to_vec(),
             terms,
         }
@@ -326,6 +327,9 @@ pub struct StoredEffect {
     /// The kind of measurement whose readings it changes, where it belongs to the instrument and not to the machine.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<String>,
+    /// Whether it belongs to where the machine stands: every set-up has terms of its own, and a new one has to be found.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub of_setup: bool,
     /// Its sizes.
     #[serde(default)]
     pub sizes: Vec<SizeOf>,
@@ -392,8 +396,8 @@ impl StoredEffect {
     /// A frame or joint that the machine does not have; a number that is none.
     pub fn bind(&self, machine: &Machine) -> Result<Vec<(f64, Vec<BoundPart>)>, Unbound> {
         let travel = vec![None; machine.dyads().len()];
-        let binding =
-            Binding { machine, own: None, partner: None, travel: &travel, time: None, parameters: &[] };
+        let (own, partner, time) = (None, None, None);
+        let binding = Binding { machine, own, partner, travel: &travel, time, begins: &[], parameters: &[] };
         let frame =
             |name: &String| machine.frame_index(name).ok_or_else(|| Unbound::UnknownFrame(name.clone()));
         let part = |part: &StoredPart| {
@@ -406,6 +410,9 @@ impl StoredEffect {
             let direction = [a, b, c, d, e, f];
             let endless = |e: &Expression| match e {
                 Expression::Number(x) | Expression::Value(x, _) | Expression::TimeSince(x) => !x.is_finite(),
+                Expression::OrderIn(begins) | Expression::BeginningIn(begins) => {
+                    begins.iter().any(|(_, n)| !n.is_finite())
+                }
                 Expression::Between(_, from, to) => !(to > from && (to - from).is_finite()),
                 _ => false,
             };

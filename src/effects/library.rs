@@ -97,7 +97,8 @@ impl Library {
         for (i, family) in form.families.iter().enumerate() {
             check(family).map_err(|(path, fault)| at((join(&format!("families[{i}]"), &path), fault)))?;
             for seat in &family.sits {
-                let twice = |f: &Family| f.name == family.name && f.sits.contains(seat);
+                let twice =
+                    |f: &Family| f.name == family.name && f.clock == family.clock && f.sits.contains(seat);
                 if form.families[..i].iter().any(twice) {
                     let what = format!("\"{}\" on {seat:?} is there twice", family.name);
                     let fault = fault(what, "keep one of them, or give them different `sits`");
@@ -292,11 +293,12 @@ fn check_range(form: &ParameterForm, seat: Seat, path: &dyn Fn(&str) -> String) 
     match (&form.range, own) {
         (Range::Travel, Some(kind)) if dimension == Dimension::of_joint(kind) => return Ok(()),
         (Range::Time, _) if dimension == Dimension::TIME => return Ok(()),
-        (Range::Travel | Range::Time, _) => {
+        (Range::Order, _) if dimension == Dimension::ONE => return Ok(()),
+        (Range::Travel | Range::Time | Range::Order, _) => {
             let what = format!("the range is not in {dimension}");
             return Err((
                 path("range"),
-                fault(what, "Travel goes with unit travel on joints, Time with unit s"),
+                fault(what, "Travel goes with unit travel on joints, Time with unit s, Order with unit 1"),
             ));
         }
         (Range::ByKind | Range::Between(..), _) => {}

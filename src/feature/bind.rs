@@ -1,5 +1,6 @@
 //! From an expression to a feature of one machine, and back.
 
+use super::express::express;
 use super::{Expression, weights};
 use crate::machine::Machine;
 use crate::units::Unit;
@@ -19,8 +20,12 @@ pub(super) enum Node {
     Parameter(usize),
     Joint(usize, Column),
     Time(f64),
+    /// Names of recordings, and with which number they begin; whether the number of the own recording's beginning is meant.
+    Order(Vec<(String, f64)>, bool),
     /// Name and unit.
     Channel(String, String),
+    /// Names of recordings.
+    Only(Vec<String>, Box<Node>),
     Sum(Vec<Node>),
     Product(Vec<Node>),
     Quotient(Box<[Node; 2]>),
@@ -86,6 +91,8 @@ pub struct Binding<'a> {
     pub travel: &'a [Option<(f64, f64)>],
     /// First and last time over all recordings, s.
     pub time: Option<(f64, f64)>,
+    /// Names of the recordings in their order, and how many samples come before each.
+    pub begins: &'a [(String, f64)],
     /// Names of the parameters, in their order.
     pub parameters: &'a [String],
 }
@@ -180,6 +187,17 @@ impl Feature {
         }
     }
 
+    /// The feature in recordings of these names, 0 in others.
+    pub fn only_in(&self, recordings: &[String]) -> Self {
+        let node = Node::Only(recordings.to_vec(), Box::new(self.node.clone()));
+        Feature { node, memories: self.memories }
+    }
+
+    /// Whether it says anything in a recording of this name.
+    pub fn is_of(&self, recording: &str) -> bool {
+        !any(&self.node, &|n| matches!(n, Node::Only(names, _) if !names.iter().any(|name| name == recording)))
+    }
+
     /// The feature with its parameters replaced by numbers, in SI.
     ///
     /// # Panics
@@ -218,6 +236,11 @@ impl Feature {
     /// Whether it needs the time of each sample.
     pub fn needs_time(&self) -> bool {
         any(&self.node, &|n| matches!(n, Node::Time(_) | Node::Lag { .. }))
+    }
+
+    /// Whether it needs to know when, by time or by the order of samples.
+    pub fn needs_moment(&self) -> bool {
+        self.needs_time() || any(&self.node, &|n| matches!(n, Node::Order(..)))
     }
 
     /// Whether it needs velocities or accelerations.
@@ -315,6 +338,10 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
         }
         E::Time => Node::Time(b.time.ok_or(Unbound::NoTime)?.0),
         E::TimeSince(since) => Node::Time(*since),
+        E::Order => Node::Order(b.begins.to_vec(), false),
+        E::Beginning => Node::Order(b.begins.to_vec(), true),
+        E::OrderIn(begins) => Node::Order(begins.clone(), false),
+        E::BeginningIn(begins) => Node::Order(begins.clone(), true),
         E::Clock => {
             let (from, to) = b.time.filter(|(from, to)| to > from).ok_or(Unbound::NoTime)?;
             Node::Between(Box::new(Node::Time(from)), 0.0, to - from)
@@ -326,6 +353,7 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
             }
             Node::Channel(name.replace("{at}", joint.map_or("", |joint| &joint.name)), unit.clone())
         }
+        E::Only(recordings, e) => Node::Only(recordings.clone(), Box::new(bind(e, b, memories)?)),
         E::Of(name, e) => bind(e, &Binding { own: Some(named(name)?), ..b.clone() }, memories)?,
         E::Partner(e) => {
             let own = Some(b.partner.ok_or(Unbound::NoJoint)?);
@@ -373,12 +401,17 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
 
 fn parts(node: &Node) -> Vec<&Node> {
     match node {
-        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(..) => {
-            Vec::new()
-        }
+        Node::Number(_)
+        | Node::Parameter(_)
+        | Node::Joint(..)
+        | Node::Time(_)
+        | Node::Order(..)
+        | Node::Channel(..) => Vec::new(),
         Node::Sum(list) | Node::Product(list) => list.iter().collect(),
         Node::Quotient(pair) => pair.iter().collect(),
-        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) => vec![e],
+        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) | Node::Only(_, e) => {
+            vec![e]
+        }
         Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],
         Node::Lag { of, time, .. } => vec![of, time],
     }
@@ -386,12 +419,17 @@ fn parts(node: &Node) -> Vec<&Node> {
 
 fn parts_mut(node: &mut Node) -> Vec<&mut Node> {
     match node {
-        Node::Number(_) | Node::Parameter(_) | Node::Joint(..) | Node::Time(_) | Node::Channel(..) => {
-            Vec::new()
-        }
+        Node::Number(_)
+        | Node::Parameter(_)
+        | Node::Joint(..)
+        | Node::Time(_)
+        | Node::Order(..)
+        | Node::Channel(..) => Vec::new(),
         Node::Sum(list) | Node::Product(list) => list.iter_mut().collect(),
         Node::Quotient(pair) => pair.iter_mut().collect(),
-        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) => vec![e],
+        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) | Node::Only(_, e) => {
+            vec![e]
+        }
         Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],
         Node::Lag { of, time, .. } => vec![of, time],
     }
@@ -424,57 +462,4 @@ fn smooth(node: &Node, index: usize) -> bool {
     let steps = matches!(node, Node::Function(Function::Step | Function::Sign, _));
     let inside = steps && any(node, &|n| *n == Node::Parameter(index));
     !inside && parts(node).into_iter().all(|part| smooth(part, index))
-}
-
-fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression {
-    use Expression as E;
-    let inner = |e: &Node| Box::new(express(e, machine, parameters));
-    let list = |nodes: &[Node]| nodes.iter().map(|e| express(e, machine, parameters)).collect();
-    let of = |j: usize, e: Expression| {
-        let name = machine.dyads()[j].joint.as_ref().map_or_else(String::new, |joint| joint.name.clone());
-        E::Of(name, Box::new(e))
-    };
-    match node {
-        Node::Number(value) => E::Number(*value),
-        Node::Parameter(index) => E::Parameter(parameters.get(*index).cloned().unwrap_or_default()),
-        Node::Joint(j, column) => of(
-            *j,
-            match column {
-                Column::Position => E::Position,
-                Column::Direction => E::Direction,
-                Column::Velocity => E::Velocity,
-                Column::Acceleration => E::Acceleration,
-                Column::SinceReversal => E::SinceReversal,
-                Column::Travelled => E::Travelled,
-                Column::Gravity => E::Gravity,
-                Column::Load => E::Load,
-                Column::Weight(index) => weights::expression(machine, *j, *index),
-            },
-        ),
-        Node::Time(since) => E::TimeSince(*since),
-        Node::Channel(name, unit) => E::Channel(name.clone(), unit.clone()),
-        Node::Sum(nodes) => E::Sum(list(nodes)),
-        Node::Product(nodes) => E::Product(list(nodes)),
-        Node::Quotient(pair) => E::Quotient(inner(&pair[0]), inner(&pair[1])),
-        Node::Power(e, n) => E::Power(inner(e), *n),
-        Node::Function(f, e) => {
-            let e = inner(e);
-            match f {
-                Function::Sin => E::Sin(e),
-                Function::Cos => E::Cos(e),
-                Function::Exp => E::Exp(e),
-                Function::Abs => E::Abs(e),
-                Function::Sign => E::Sign(e),
-                Function::Positive => E::Positive(e),
-                Function::Step => E::Step(e),
-                Function::Saturate => E::Saturate(e),
-                Function::Bump => E::Bump(e),
-            }
-        }
-        Node::Chebyshev(order, e) => E::Chebyshev(*order, inner(e)),
-        Node::Between(e, from, to) => E::Between(inner(e), *from, *to),
-        Node::Play { joint, width, .. } => of(*joint, E::Play(inner(width))),
-        Node::TakeUp { joint, length, .. } => of(*joint, E::TakeUp(inner(length))),
-        Node::Lag { of, time, .. } => E::Lag(inner(of), inner(time)),
-    }
 }

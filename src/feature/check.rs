@@ -73,7 +73,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
         Err(f)
     };
     match expression {
-        Number(_) | Clock => Ok(Dimension::ONE),
+        Number(_) | Clock | Order | Beginning | OrderIn(_) | BeginningIn(_) => Ok(Dimension::ONE),
         Value(_, symbol) | Channel(_, symbol) => match Unit::named(symbol) {
             Some(unit) => Ok(Dimension::of_quantity(unit.quantity)),
             None => Err(fault(format!("\"{symbol}\" is no unit"), "write a unit such as mm, deg, s, degC")),
@@ -99,6 +99,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
         Shear(_) => own().map(|_| Dimension::FORCE),
         Lever(..) => own().map(|_| Dimension::FORCE.times(Dimension::LENGTH)),
         Time | TimeSince(_) => Ok(Dimension::TIME),
+        Only(_, e) => shift(dimension_of(e, scope), "[1]"),
         Of(name, e) => {
             let kind = (scope.named)(name).ok_or_else(|| {
                 fault(format!("joint \"{name}\" is not one of the machine's"), "name a joint of the machine")

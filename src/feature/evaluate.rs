@@ -24,6 +24,9 @@ impl<S: Scalar> Memory<S> {
     }
 }
 
+/// Number of a sample of a recording that others know nothing of: it comes after all of them.
+const AFTERWARDS: f64 = 1e12;
+
 /// One number for all samples, or one for each.
 enum Value<S> {
     Constant(S),
@@ -183,8 +186,25 @@ impl<S: Scalar> Pass<'_, S> {
                 let time = self.samples.time.as_deref().unwrap_or(&[]);
                 self.lifted(time).map(|t| t.offset(-since))
             }
+            Node::Order(begins, of_beginning) => {
+                let samples = self.samples;
+                let Some((_, begin)) = begins.iter().find(|(name, _)| *name == samples.recording) else {
+                    return Value::Constant(one.lift(AFTERWARDS));
+                };
+                match of_beginning {
+                    true => Value::Constant(one.lift(*begin)),
+                    false => self.lifted(&samples.number).map(|n| n.offset(*begin)),
+                }
+            }
             Node::Channel(name, _) => {
                 self.lifted(self.samples.channels.get(name).map_or(&[][..], Vec::as_slice))
+            }
+            Node::Only(recordings, e) => {
+                let value = self.evaluate(e);
+                match recordings.contains(&self.samples.recording) {
+                    true => value,
+                    false => Value::Constant(one.lift(0.0)),
+                }
             }
             Node::Sum(list) => self.fold(list, 0.0, |a, b| a + b),
             Node::Product(list) => self.fold(list, 1.0, |a, b| a * b),

@@ -44,6 +44,10 @@ pub enum Expression {
     Time,
     /// Where the time stands within the time seen, from -1 to 1.
     Clock,
+    /// Number of samples before this one, in all recordings in their order.
+    Order,
+    /// The same of the first sample of its recording.
+    Beginning,
     /// An extra column of the recording by name and unit, `Channel("temperature", "degC")`; in SI, whatever that unit.
     Channel(String, String),
 
@@ -95,6 +99,13 @@ pub enum Expression {
     Lag(Box<Expression>, Box<Expression>),
     /// Time since this moment on the recordings' clock, s. What `Time` becomes in a calibrated file.
     TimeSince(f64),
+    /// Number of samples before this one where recordings of these names begin with these numbers; far beyond all of them in another
+    /// recording. What `Order` becomes in a calibrated file.
+    OrderIn(Vec<(String, f64)>),
+    /// The same of the first sample of its recording: what `Beginning` becomes.
+    BeginningIn(Vec<(String, f64)>),
+    /// The value in recordings of these names, 0 in others. What features of a family with `each_setup` become.
+    Only(Vec<String>, Box<Expression>),
 }
 
 impl Expression {
@@ -108,7 +119,7 @@ impl Expression {
             Difference(a, b) | Quotient(a, b) | Lag(a, b) => {
                 vec![(&**a, "[0]".into()), (&**b, "[1]".into())]
             }
-            Of(_, e) | Chebyshev(_, e) => vec![(&**e, "[1]".into())],
+            Of(_, e) | Chebyshev(_, e) | Only(_, e) => vec![(&**e, "[1]".into())],
             Partner(e)
             | Power(e, _)
             | Sin(e)
@@ -126,7 +137,8 @@ impl Expression {
             | TakeUp(e) => vec![(&**e, "[0]".into())],
             Number(_) | Value(..) | Parameter(_) | Position | Stroke | Direction | Velocity
             | Acceleration | SinceReversal | Travelled | Gravity | Load | Moment(_) | Shear(_)
-            | Lever(..) | Time | Clock | Channel(..) | TimeSince(_) => Vec::new(),
+            | Lever(..) | Time | Clock | Order | Beginning | Channel(..) | TimeSince(_) | OrderIn(_)
+            | BeginningIn(_) => Vec::new(),
         }
     }
 

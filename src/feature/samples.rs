@@ -19,6 +19,10 @@ pub struct Samples {
     pub len: usize,
     /// Whether these are the first of their recording; play and take-up begin anew there.
     pub first: bool,
+    /// Name of the recording; empty where there is none.
+    pub recording: String,
+    /// Number of samples before each in the recording.
+    pub number: Vec<f64>,
     /// Time on the recordings' clock, s.
     pub time: Option<Vec<f64>>,
     /// Columns of each dyad's joint, machine order; `None` for a frame without joint.
@@ -62,6 +66,7 @@ impl Samples {
     /// Puts the samples that follow behind these.
     pub(crate) fn append(&mut self, next: Samples) {
         self.len += next.len;
+        self.number.extend(next.number);
         if let (Some(own), Some(next)) = (&mut self.time, next.time) {
             own.extend(next);
         }
@@ -98,6 +103,8 @@ impl Samples {
         Samples {
             len,
             first: self.first,
+            recording: self.recording.clone(),
+            number: f(&self.number),
             time: self.time.as_ref().map(&f),
             joints: self.joints.iter().map(|j| j.as_ref().map(joint)).collect(),
             channels: self.channels.iter().map(|(name, column)| (name.clone(), f(column))).collect(),
@@ -121,6 +128,8 @@ impl Samples {
         Samples {
             len: usize::from(k < self.len),
             first: self.first && k == 0,
+            recording: self.recording.clone(),
+            number: one(&self.number),
             time: self.time.as_ref().map(one),
             joints: self.joints.iter().map(|j| j.as_ref().map(joint)).collect(),
             channels: self.channels.iter().map(|(name, column)| (name.clone(), one(column))).collect(),
@@ -138,8 +147,10 @@ pub struct Follow<'a, I> {
     held: Option<Chunk>,
     /// Times and displacements of the last samples before the one held.
     before: Vec<(f64, Vec<f64>)>,
-    started: bool,
+    /// Samples so far.
+    count: usize,
     pause_after: f64,
+    recording: String,
     channels: Vec<String>,
     ended: bool,
 }
@@ -238,6 +249,8 @@ pub fn first_directions(
 /// What is the same for every chunk of a recording.
 #[derive(Clone, Debug)]
 pub struct FollowOptions {
+    /// Name of the recording.
+    pub recording: String,
     /// Motion against the direction of travel that counts as a reversal only beyond this, m or rad, for each dyad.
     pub dead_bands: Vec<f64>,
     /// Directions of the first motion, from [`first_directions`].
@@ -271,8 +284,9 @@ impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
             weights: options.with_gravity.then(|| Weights::new(machine, options.gravity_b)),
             held: None,
             before: Vec::new(),
-            started: false,
+            count: 0,
             pause_after: options.pause_after,
+            recording: options.recording.clone(),
             channels: options.channels.clone(),
             ended: false,
         }
@@ -311,10 +325,12 @@ impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
         if let Some(times) = &chunk.time {
             self.rates(times, &moved, ahead, &mut joints);
         }
-        let first = !self.started && chunk.len > 0;
-        self.started |= first;
+        let first = self.count == 0 && chunk.len > 0;
+        let number = (self.count..self.count + chunk.len).map(|n| n as f64).collect();
+        self.count += chunk.len;
         let channels = self.channels.iter().cloned().zip(chunk.channels.iter().cloned()).collect();
-        Samples { len: chunk.len, first, time: chunk.time.clone(), joints, channels }
+        let (recording, time) = (self.recording.clone(), chunk.time.clone());
+        Samples { len: chunk.len, first, recording, number, time, joints, channels }
     }
 
     /// Velocities and accelerations, with what stands before and after the chunk.
@@ -388,6 +404,7 @@ impl<I: Iterator<Item = Result<Chunk>>> Iterator for Follow<'_, I> {
 pub fn samples_of(recording: &Recording, machine: &Machine, dead_bands: &[f64]) -> Result<Vec<Samples>> {
     let first = first_directions(machine, dead_bands, recording.chunks()?)?;
     let options = FollowOptions {
+        recording: recording.name().to_string(),
         dead_bands: dead_bands.to_vec(),
         first_directions: first,
         pause_after: recording.scan()?.pause_after.unwrap_or(f64::INFINITY),

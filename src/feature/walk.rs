@@ -141,7 +141,8 @@ impl Walk {
             }
             joints[*j] = Some(columns);
         }
-        Samples { len: 1, first, time: time.map(|t| vec![t]), joints, channels: Default::default() }
+        let time = time.map(|t| vec![t]);
+        Samples { len: 1, first, time, joints, ..Samples::default() }
     }
 
     /// Velocity and acceleration of every dyad's joint, from this step and those before it.

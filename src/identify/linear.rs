@@ -127,6 +127,7 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[
         let first_sample = linear.lines.len();
         let mut number = 0u64;
         let options = FollowOptions {
+            recording: source.recording.name().to_string(),
             dead_bands: bands.to_vec(),
             first_directions: first_directions(machine, bands, source.recording.chunks()?)?,
             pause_after: source.summary.pause_after.unwrap_or(f64::INFINITY),

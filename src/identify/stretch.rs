@@ -124,6 +124,7 @@ pub(crate) fn stretches<'a>(
         })));
     }
     let options = FollowOptions {
+        recording: recording.name().to_string(),
         dead_bands: by_dyad(machine, dead_bands),
         first_directions: beginning.dyads.clone(),
         pause_after: pause_after.unwrap_or(f64::INFINITY),
