@@ -12,6 +12,7 @@ mod held_out;
 mod leftover;
 mod model;
 mod noise;
+mod not_tried;
 mod outliers;
 mod refine;
 mod score;
@@ -19,12 +20,14 @@ mod search;
 mod shape;
 mod space;
 mod spectrum;
+mod speeds;
 mod stretch;
 mod traces;
 mod unexplained;
 mod waves;
 
 pub use finding::{Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size};
+pub use not_tried::NotTried;
 pub use outliers::{Outliers, WithoutOutliers};
 pub use stretch::Where;
 pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
@@ -40,8 +43,9 @@ use crate::machine::Machine;
 use crate::recording::Recording;
 use coarse::Coarse;
 use noise::{Noise, Whitener};
+use not_tried::not_tried;
 use score::Rows;
-use search::Search;
+use search::{Active, Search};
 
 /// What a diagnosis is asked.
 #[derive(Clone, Debug, Default)]
@@ -104,16 +108,21 @@ pub fn diagnose(
         };
         active = search.run(&active);
         let judged = noise_of(&linear, &finding::residual_of(&search, &active), &runs, &out, &facts);
+        let report = |search: &Search, active: &[Active]| -> Diagnosis {
+            let mut diagnosis = finding::report(search, active, machine, library, &noise);
+            diagnosis.not_tried = not_tried(&candidates);
+            diagnosis
+        };
         if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
             let heat = search.leftover(&search.beside(&active, None)).heat;
             if heat < HOT {
                 let active = folds::useful(&search, &active, most_wild);
-                return Ok(finding::report(&search, &active, machine, library, &noise));
+                return Ok(report(&search, &active));
             }
             // Much is left, as it always is on real machines: the simplest names that stand out from it count.
             let search = Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
             active = folds::useful(&search, &search.run(&active), most_wild);
-            return Ok(finding::report(&search, &active, machine, library, &noise));
+            return Ok(report(&search, &active));
         }
         noise = judged;
     }

@@ -6,8 +6,10 @@ use serde::Serialize;
 use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
+use super::not_tried::NotTried;
 use super::outliers::{self, Outliers, WithoutOutliers};
 use super::search::{Active, Rival, Search, VISIBLE, all_but};
+use super::speeds::levelled;
 use super::stretch::{Where, wheres};
 use super::traces::{self, Traces};
 use super::unexplained::{self, Unexplained};
@@ -54,6 +56,12 @@ pub struct Diagnosis {
     /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
+    /// Effects that could not be looked for in these recordings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_tried: Vec<NotTried>,
+    /// Rows left out because a number was missing.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub dropped: u64,
     /// Samples that were left out because they lie far off.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<Outliers>,
@@ -235,12 +243,13 @@ pub(super) fn report(
         let fit = |r: &&Rival| r.candidate == effect.candidate || !search.repeats(r, &others);
         let rivals: Vec<Rival> = rivals.iter().filter(fit).map(|r| search.tempered(r, left.heat)).collect();
         let own = rivals.iter().find(|r| r.candidate == effect.candidate);
-        let Some(own) = own.filter(|r| r.weight > TOLD) else { continue };
+        let Some(own) = own.filter(|r| r.weight > TOLD).cloned() else { continue };
         if is_unexplained {
             continue;
         }
         let is_plain = search.commonness[own.candidate] == 0.0 && shares.shapes < PLAIN * total;
-        let odds = odds(search, &rivals, own, left.heat.max(search.heat), is_plain);
+        let rivals = if is_plain { rivals } else { levelled(search, &own, rivals) };
+        let odds = odds(search, &rivals, &own, left.heat.max(search.heat), is_plain);
         let own_odds = odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
         let alike = odds.iter().map(|(_, p, _)| *p).filter(|p| *p >= ALIAS * own_odds);
         let probability = alike.sum::<f64>().min(1.0) * trust(shares.shapes / total, 2.0 * own.weight);
@@ -337,6 +346,8 @@ pub(super) fn report(
         findings,
         unexplained,
         named,
+        not_tried: Vec::new(),
+        dropped: linear.fit.dropped,
         outliers: Vec::new(),
         rms_without_outliers_m: None,
         rms_without_outliers_rad: None,
@@ -348,6 +359,10 @@ pub(super) fn report(
     folds::fill(search, &told, &mut diagnosis);
     traces::fill(search, &told, &left_over, machine, &mut diagnosis);
     diagnosis
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {

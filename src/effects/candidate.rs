@@ -279,8 +279,15 @@ fn candidate(
     let bind = |expression: &Expression, own| {
         Feature::bind(expression, &binding(own)).map_err(|e| e.to_string()).and_then(|f| has_all(f, facts))
     };
+    let (spacing, stride) = own.map_or((0.0, 0.0), |j| (facts.spacing[j], facts.stride[j]));
+    if widest_play(family).is_some_and(|width| width < stride) {
+        return Err(grid::TOO_FAR.into());
+    }
     let ranges = (family.parameters.iter())
-        .map(|form| grid::range(form, own_kind, travel, own.map_or(0.0, |j| facts.spacing[j]), facts))
+        .map(|form| {
+            let stride = if is_taken_up(family, &form.name) { stride } else { 0.0 };
+            grid::range(form, own_kind, travel, spacing, stride, facts)
+        })
         .collect::<Result<Vec<_>, _>>()?;
 
     // Features of the own joint; a family on every joint has those of each joint in their turn.
@@ -422,6 +429,27 @@ fn in_each_setup(
         own_features.extend(features.iter().map(|feature| feature.only_in(recordings)));
     }
     Ok((own_features, own_coefficients))
+}
+
+/// The widest play of which the width is stated, m or rad.
+fn widest_play(family: &Family) -> Option<f64> {
+    let mut widest: Option<f64> = None;
+    for feature in &family.features {
+        if let Expression::Play(width) = feature
+            && let Expression::Value(value, symbol) = &**width
+            && let Some(unit) = Unit::named(symbol)
+        {
+            widest = Some(widest.unwrap_or(0.0).max(unit.to_si(*value)));
+        }
+    }
+    widest
+}
+
+/// Whether a parameter is the travel in which something is taken up.
+fn is_taken_up(family: &Family, parameter: &str) -> bool {
+    let named = |e: &Expression| matches!(e, Expression::Parameter(name) if name == parameter);
+    let takes = |e: &Expression| matches!(e, Expression::TakeUp(length) if length.any(&named));
+    family.features.iter().any(|feature| feature.any(&takes))
 }
 
 /// Whether the joint of dyad `j` carries masses that the machine file states.

@@ -15,6 +15,8 @@ pub struct RecordingFacts {
     /// Median gap between neighbouring distinct positions of every dyad's joint over all recordings, m or rad; the whole travel where
     /// they are few targets visited again and again; 0 where the joint stands still.
     pub spacing: Vec<f64>,
+    /// Median distance of every dyad's joint from one settled position to the next, m or rad; 0 where samples are taken in motion.
+    pub stride: Vec<f64>,
     /// How many places every dyad's joint was seen at, where they are few targets visited again and again.
     pub places: Vec<Option<usize>>,
     /// First and last time, s, if all recordings have one.
@@ -71,6 +73,7 @@ impl RecordingFacts {
             // Smallest steps, until all recordings are read.
             dead_bands: vec![f64::INFINITY; dyads],
             spacing: vec![0.0; dyads],
+            stride: vec![0.0; dyads],
             places: vec![None; dyads],
             time: None,
             one_clock: true,
@@ -87,10 +90,11 @@ impl RecordingFacts {
         let mut all_timed = true;
         let mut spans: Vec<(f64, f64)> = Vec::new();
         let mut seen: Vec<Vec<f64>> = vec![Vec::new(); dyads];
+        let mut strides: Vec<Vec<f64>> = vec![Vec::new(); dyads];
         for (i, recording) in recordings.iter().enumerate() {
             all_timed &= recording.has_time();
             facts.begins.push((recording.name().to_string(), facts.samples));
-            spans.extend(facts.take(machine, recording, &mut seen)?);
+            spans.extend(facts.take(machine, recording, &mut seen, &mut strides)?);
             facts.take_setup(recording);
             let channels = recording.extra_channels().iter().map(|c| (c.name.clone(), c.unit.quantity));
             match i {
@@ -104,6 +108,9 @@ impl RecordingFacts {
             if readings.len() > facts.readings.len() {
                 facts.readings = readings;
             }
+        }
+        if facts.settled {
+            facts.stride = strides.into_iter().map(|own| median(own.into_iter())).collect();
         }
         if !all_timed {
             (facts.time, facts.step, facts.longest) = (None, None, 0.0);
@@ -139,6 +146,7 @@ impl RecordingFacts {
         machine: &Machine,
         recording: &Recording,
         seen: &mut [Vec<f64>],
+        strides: &mut [Vec<f64>],
     ) -> Result<Option<(f64, f64)>> {
         let commands = machine.commands().len();
         let mut own: Vec<Option<(f64, f64)>> = vec![None; machine.dyads().len()];
@@ -165,6 +173,11 @@ impl RecordingFacts {
                         self.dead_bands.iter_mut().zip(&step).filter(|(_, step)| **step > 0.0)
                     {
                         *least = least.min(*step);
+                    }
+                    for (own, step) in strides.iter_mut().zip(&step) {
+                        if *step > STANDSTILL && own.len() < POSITIONS {
+                            own.push(*step);
+                        }
                     }
                     // The first samples say what the usual steps are.
                     if steps.len() < 4096 {

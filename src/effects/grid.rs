@@ -5,6 +5,8 @@ use super::family::{Grid, ParameterForm, Range};
 use crate::feature::Dimension;
 use crate::machine::JointKind;
 
+/// Part of a step between settled positions within which a take-up cannot be told from none.
+const TAKEN_UP: f64 = 0.3;
 /// Part of a recording at its beginning and its end in which no slip is looked for.
 const EDGE: f64 = 0.05;
 /// More points than this are cut short, evenly: a grid that large is a mistake of the library.
@@ -16,6 +18,7 @@ pub(super) fn range(
     own: Option<JointKind>,
     travel: Option<(f64, f64)>,
     spacing: f64,
+    stride: f64,
     facts: &RecordingFacts,
 ) -> Result<(f64, f64), String> {
     match form.range {
@@ -23,7 +26,7 @@ pub(super) fn range(
             let (from, to) = travel.ok_or("the joint does not move")?;
             // Among few targets nobody sees where along the travel something begins and ends.
             if matches!(form.grid, Grid::Within(..)) && spacing >= to - from {
-                return Err("positions lie too far apart to show it".into());
+                return Err(TOO_FAR.into());
             }
             Ok((from, to))
         }
@@ -33,6 +36,11 @@ pub(super) fn range(
         Range::ByKind | Range::Between(..) => {
             let (from, to, dimension) = form.stated(own).ok_or("no range is given for this kind of place")?;
             let (from, to) = narrowed(form, dimension, (from, to), travel, facts);
+            // What is taken up within a step from one settled position to the next looks as if it were taken up at once.
+            let from = from.max(TAKEN_UP * stride);
+            if from > to {
+                return Err(TOO_FAR.into());
+            }
             resolved(form, dimension, (from, to), spacing)
         }
     }
@@ -52,10 +60,12 @@ fn resolved(
         _ => return Ok((from, to)),
     };
     if from > to {
-        return Err("positions lie too far apart to show it".into());
+        return Err(TOO_FAR.into());
     }
     Ok((from, to))
 }
+
+pub(super) const TOO_FAR: &str = "positions lie too far apart to show it";
 
 pub(super) const MANY_CLOCKS: &str = "it needs one clock, and the recordings' times overlap";
 

@@ -7,7 +7,7 @@ use kincal::location::LocationErrors;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::plot::{AFTER, BACKWARD, BEFORE, CURVE, FORWARD, Layer, Marks, NEITHER, Plot, envelope, thinned};
-use super::text::{CALM, about, about_unexplained, amount, figures, probability, tests};
+use super::text::{CALM, about, about_unexplained, amount, figures, not_tried, probability, tests};
 use crate::cli::output::Kind;
 
 /// Dots and corners of all pictures together, and of one at most: the file stays below a megabyte.
@@ -61,6 +61,10 @@ pub(crate) fn page(diagnosis: &Diagnosis) -> String {
                 h2 { "What is left" }
                 @for angle in [false, true] { (left(diagnosis, angle)) }
                 (geometry(&diagnosis.location_errors))
+                @if !diagnosis.not_tried.is_empty() {
+                    h2 { "What could not be looked for" }
+                    ul { @for line in not_tried(diagnosis) { li { (line) } } }
+                }
                 p.note {
                     "Residuals are measured minus model. Pictures show every so many samples, extremes along the path kept; they are of the \
                      linearised model that the search works on. kincal " (env!("CARGO_PKG_VERSION")) "."

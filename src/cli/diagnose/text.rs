@@ -35,7 +35,20 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
     } else if diagnosis.findings.is_empty() {
         let _ = writeln!(text, "\n{CALM}");
     }
+    let not_tried = not_tried(diagnosis);
+    if let Some(line) = not_tried.first() {
+        let _ = writeln!(text, "\nnot tried: {line}");
+    }
+    if not_tried.len() > 1 {
+        let more = count(not_tried.len() as u64 - 1, "reason", "reasons");
+        let _ = writeln!(text, "           others for {more} more, listed in the report and in --json");
+    }
     text
+}
+
+/// Effects that could not be looked for, a line for each reason, the one that concerns most first.
+pub(crate) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
+    diagnosis.not_tried.iter().map(|n| format!("{}: {}", n.effects.join(", "), n.because)).collect()
 }
 
 /// Where there is nothing to be found.
@@ -85,6 +98,41 @@ pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
         let mut line = format!("on stretches left out of the fit: {}", amount(geometric, angle));
         if found {
             let _ = write!(line, " -> {}", amount(r#final, angle));
+        }
+        lines.push(line);
+    }
+    if diagnosis.dropped > 0 {
+        let rows = count(diagnosis.dropped, "row", "rows");
+        lines.push(format!("drop-outs: {rows} with a missing number, left out"));
+    }
+    lines.extend(outliers(diagnosis));
+    lines
+}
+
+/// Lines of a file that are told one by one.
+const FEW_LINES: usize = 8;
+
+/// Samples that were left out as outliers, by recording, and what the others leave.
+fn outliers(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut lines = Vec::new();
+    for one in &diagnosis.outliers {
+        let by: Vec<String> =
+            both(one.largest_m, one.largest_rad).into_iter().map(|(x, angle)| amount(x, angle)).collect();
+        let shown: Vec<String> = one.lines.iter().take(FEW_LINES).map(u64::to_string).collect();
+        lines.push(format!(
+            "outliers: {} of {}, off by up to {} (line {}{}), left out of the fit",
+            count(one.lines.len() as u64, "sample", "samples"),
+            one.recording,
+            by.join(" and "),
+            shown.join(", "),
+            if one.lines.len() > FEW_LINES { " ..." } else { "" },
+        ));
+    }
+    let (m, rad) = (diagnosis.rms_without_outliers_m, diagnosis.rms_without_outliers_rad);
+    for (rms, angle) in both(m, rad) {
+        let mut line = format!("RMS without the outliers: {} with geometry", amount(rms.geometric, angle));
+        if !diagnosis.findings.is_empty() {
+            let _ = write!(line, " -> {} with what is named below", amount(rms.r#final, angle));
         }
         lines.push(line);
     }

@@ -1,0 +1,32 @@
+//! Effects that could not be looked for: what they need is not in the recordings.
+
+use serde::Serialize;
+
+use crate::effects::Candidates;
+
+/// Effects that were tried nowhere, for one reason.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct NotTried {
+    /// Why, as the end of a sentence.
+    pub because: String,
+    /// Names of the effects.
+    pub effects: Vec<String>,
+}
+
+/// Effects without a single place, by the reason that was given first.
+pub(super) fn not_tried(candidates: &Candidates) -> Vec<NotTried> {
+    let mut all: Vec<NotTried> = Vec::new();
+    for skipped in &candidates.skipped {
+        let (effect, because) = (&skipped.effect, &skipped.reason);
+        let tried = candidates.all.iter().any(|c| c.effect == *effect);
+        if tried || all.iter().any(|known| known.effects.contains(effect)) {
+            continue;
+        }
+        match all.iter_mut().find(|known| known.because == *because) {
+            Some(known) => known.effects.push(effect.clone()),
+            None => all.push(NotTried { because: because.clone(), effects: vec![effect.clone()] }),
+        }
+    }
+    all.sort_by_key(|known| std::cmp::Reverse(known.effects.len()));
+    all
+}
