@@ -110,8 +110,9 @@ const SHAPE: f64 = 0.35;
 const HIDDEN: f64 = 0.8;
 /// So many spaces are kept.
 const GROUNDS: usize = 12;
-/// More effects are not looked for.
+/// More effects are not looked for: among settled positions many joints give way at once; what takes more names in a motion has none.
 const MOST: usize = 8;
+const MOST_IN_MOTION: usize = 5;
 /// Logarithm of the odds at which an effect is taken in.
 const ENTER: f64 = 8.0;
 
@@ -306,7 +307,8 @@ impl Search<'_> {
         self.swap(&mut active);
         let mut tried: HashSet<Vec<usize>> = HashSet::new();
         let (mut sound, mut harmful) = (active.clone(), 0);
-        while active.len() < MOST {
+        let most = if self.in_motion { MOST_IN_MOTION } else { MOST };
+        while active.len() < most {
             // Swaps may throw out what the next step takes in again.
             if !tried.insert(active.iter().map(|effect| effect.candidate).collect()) {
                 break;
