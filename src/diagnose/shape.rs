@@ -213,17 +213,6 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64
             } else if !rates && !is_wave {
                 curves.extend((1..=CURVE).map(|n| chebyshev(n, &position)));
             }
-            // A wave that is read late, or through play, is shifted to one side or the other.
-            if is_wave && !history && !rates {
-                let direction = column(stretches, *j, |c| &c.direction);
-                let velocity = column(stretches, *j, |c| &c.velocity);
-                for f in &own {
-                    curves.push(product(f, &direction));
-                    if velocity.len() == f.len() {
-                        curves.push(product(f, &by_largest(&velocity)));
-                    }
-                }
-            }
             // Its strength may differ along the way.
             if !is_wave || history {
                 for f in &own {
