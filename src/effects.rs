@@ -22,6 +22,7 @@ pub use family::{
     Clock, Directions, Family, Grid, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat,
     Size, Which,
 };
+pub(crate) use grid::NO_TIME;
 pub use identified::{BoundPart, Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
 pub use library::{Library, LibraryFault};
 pub use quantity::in_words;

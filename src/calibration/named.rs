@@ -120,15 +120,13 @@ impl CalibratedMachine {
                 None => setups.push((setup, vec![name])),
             }
         }
-        let terms = own.variation.varying.terms.len() - own.effects.iter().map(|e| e.terms.len()).sum::<usize>();
+        let terms =
+            own.variation.varying.terms.len() - own.effects.iter().map(|e| e.terms.len()).sum::<usize>();
         own.variation.varying.terms.truncate(terms);
         own.variation.coefficients.truncate(terms);
         for effect in std::mem::take(&mut own.effects) {
-            let (known, shapes) = if effect.of_setup {
-                apart(&effect, recordings)
-            } else {
-                (effect.terms.clone(), Vec::new())
-            };
+            let (known, shapes) =
+                if effect.of_setup { apart(&effect, recordings) } else { (effect.terms.clone(), Vec::new()) };
             let fixed = known.len();
             let mut effect = StoredEffect { terms: known, ..effect };
             let mut scales = Vec::new();
@@ -235,7 +233,8 @@ fn apart(effect: &StoredEffect, recordings: &[Recording]) -> (Vec<StoredTerm>, V
             None => shapes.push((own, vec![term.value])),
         }
     }
-    let known = effect.terms.iter().filter(|t| !t.parts.iter().any(|p| is_here(&p.feature))).cloned().collect();
+    let known =
+        effect.terms.iter().filter(|t| !t.parts.iter().any(|p| is_here(&p.feature))).cloned().collect();
     let rms = |values: Vec<f64>| {
         let squares = values.iter().map(|v| v * v).sum::<f64>();
         (squares / values.len() as f64).sqrt().max(f64::MIN_POSITIVE)
@@ -250,7 +249,9 @@ fn not_in(recording: &Recording, effect: &StoredEffect, features: &[&Feature]) -
         return Some(format!("it belongs to the instrument of the {own}, and {kind} was measured"));
     }
     if effect.of_setup && !features.iter().any(|f| f.is_of(recording.name())) {
-        return Some("it belongs to where the machine stood, and this is another set-up: --fit-setup finds it".into());
+        return Some(
+            "it belongs to where the machine stood, and this is another set-up: --fit-setup finds it".into(),
+        );
     }
     if !recording.has_time() && features.iter().any(|f| f.needs_time() || f.needs_rates()) {
         return Some("the recording has no time column `t`".into());

@@ -248,7 +248,9 @@ pub(super) fn report(
             continue;
         }
         let is_plain = search.commonness[own.candidate] == 0.0 && shares.shapes < PLAIN * total;
-        let rivals = if is_plain { rivals } else { levelled(search, &own, rivals) };
+        // A shape that is little beside all may be much beside this one.
+        let in_shape = shares.shapes < PLAIN * 2.0 * own.score.gain;
+        let rivals = if in_shape { rivals } else { levelled(search, &own, rivals) };
         let odds = odds(search, &rivals, &own, left.heat.max(search.heat), is_plain);
         let own_odds = odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
         let alike = odds.iter().map(|(_, p, _)| *p).filter(|p| *p >= ALIAS * own_odds);

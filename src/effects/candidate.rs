@@ -157,6 +157,13 @@ pub struct Skipped {
     pub reason: String,
 }
 
+impl Skipped {
+    /// Whether a column of times would let it be tried.
+    pub(crate) fn is_for_want_of_time(&self) -> bool {
+        self.reason == grid::NO_TIME || self.reason == Unbound::NoTime.to_string()
+    }
+}
+
 /// All candidates, and what was left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Candidates {
@@ -408,8 +415,8 @@ fn in_each_setup(
     coefficients: &[Coefficient],
     facts: &RecordingFacts,
 ) -> Result<(Vec<Feature>, Vec<Coefficient>), String> {
-    if facts.setups.len() < 2 && features.iter().all(|f| *f == Feature::one()) {
-        return Err("there is one set-up".into());
+    if facts.setups.len() < 2 {
+        return Err("of one set-up nothing tells it from the machine's own".into());
     }
     if facts.begins.is_empty() {
         return Err("two recordings have one name, and nothing says which set-up is meant".into());
@@ -419,9 +426,7 @@ fn in_each_setup(
         for (s, (setup, _)) in facts.setups.iter().enumerate() {
             let mut own = coefficient.clone();
             own.parts.iter_mut().for_each(|part| part.feature += s * features.len());
-            if facts.setups.len() > 1 {
-                own.direction = format!("{}@{setup}", own.direction);
-            }
+            own.direction = format!("{}@{setup}", own.direction);
             own_coefficients.push(own);
         }
     }

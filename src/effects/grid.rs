@@ -69,7 +69,7 @@ pub(super) const TOO_FAR: &str = "positions lie too far apart to show it";
 
 pub(super) const MANY_CLOCKS: &str = "it needs one clock, and the recordings' times overlap";
 
-pub(super) const NO_TIME: &str = "it needs time, and a recording has no column t";
+pub(crate) const NO_TIME: &str = "it needs time, and a recording has no column t";
 
 /// Lengths, angles and times beyond what was seen cannot be told apart there: the range ends at a few times that. What is faster
 /// than the samples follow each other cannot be seen either.

@@ -195,7 +195,10 @@ impl Feature {
 
     /// Whether it says anything in a recording of this name.
     pub fn is_of(&self, recording: &str) -> bool {
-        !any(&self.node, &|n| matches!(n, Node::Only(names, _) if !names.iter().any(|name| name == recording)))
+        !any(
+            &self.node,
+            &|n| matches!(n, Node::Only(names, _) if !names.iter().any(|name| name == recording)),
+        )
     }
 
     /// The feature with its parameters replaced by numbers, in SI.
@@ -409,7 +412,11 @@ fn parts(node: &Node) -> Vec<&Node> {
         | Node::Channel(..) => Vec::new(),
         Node::Sum(list) | Node::Product(list) => list.iter().collect(),
         Node::Quotient(pair) => pair.iter().collect(),
-        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) | Node::Only(_, e) => {
+        Node::Power(e, _)
+        | Node::Function(_, e)
+        | Node::Chebyshev(_, e)
+        | Node::Between(e, ..)
+        | Node::Only(_, e) => {
             vec![e]
         }
         Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],
@@ -427,7 +434,11 @@ fn parts_mut(node: &mut Node) -> Vec<&mut Node> {
         | Node::Channel(..) => Vec::new(),
         Node::Sum(list) | Node::Product(list) => list.iter_mut().collect(),
         Node::Quotient(pair) => pair.iter_mut().collect(),
-        Node::Power(e, _) | Node::Function(_, e) | Node::Chebyshev(_, e) | Node::Between(e, ..) | Node::Only(_, e) => {
+        Node::Power(e, _)
+        | Node::Function(_, e)
+        | Node::Chebyshev(_, e)
+        | Node::Between(e, ..)
+        | Node::Only(_, e) => {
             vec![e]
         }
         Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],

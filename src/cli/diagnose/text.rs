@@ -35,18 +35,14 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
     } else if diagnosis.findings.is_empty() {
         let _ = writeln!(text, "\n{CALM}");
     }
-    let not_tried = not_tried(diagnosis);
-    if let Some(line) = not_tried.first() {
-        let _ = writeln!(text, "\nnot tried: {line}");
-    }
-    if not_tried.len() > 1 {
-        let more = count(not_tried.len() as u64 - 1, "reason", "reasons");
-        let _ = writeln!(text, "           others for {more} more, listed in the report and in --json");
+    for timeless in diagnosis.not_tried.iter().filter(|n| n.for_want_of_time) {
+        let names = timeless.effects.join(", ");
+        let _ = writeln!(text, "\nnot tried, since a recording has no column t: {names}");
     }
     text
 }
 
-/// Effects that could not be looked for, a line for each reason, the one that concerns most first.
+/// Effects that could not be looked for, a line for each reason.
 pub(crate) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
     diagnosis.not_tried.iter().map(|n| format!("{}: {}", n.effects.join(", "), n.because)).collect()
 }
