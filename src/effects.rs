@@ -8,15 +8,17 @@
 //! library.
 
 mod candidate;
+mod directions;
 mod facts;
 mod family;
 mod grid;
 mod identified;
 mod library;
+mod place;
 mod quantity;
 mod scan;
 
-pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Place, Skipped, Slot};
+pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Skipped};
 pub use facts::RecordingFacts;
 pub use family::{
     Clock, Directions, Family, Grid, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat,
@@ -25,4 +27,5 @@ pub use family::{
 pub(crate) use grid::NO_TIME;
 pub use identified::{BoundPart, Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
 pub use library::{Library, LibraryFault};
+pub use place::{Place, Slot};
 pub use quantity::in_words;

@@ -20,7 +20,7 @@ pub(crate) struct Args {
     /// Where to write the recording with model and residual columns
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
-    /// Find again what belongs to the set-up (frame w, tool point, zero, length); the machine stays as it is
+    /// Find again what belongs to the set-up (frame w, tool point, zero, length, effects of where it stands); the machine stays as it is
     #[arg(long)]
     fit_setup: bool,
     #[command(flatten)]

@@ -1,71 +1,15 @@
 //! Families on one machine with given recordings: candidates with everything resolved.
 
+use super::directions::directions;
 use super::facts::RecordingFacts;
-use super::family::{Clock, Directions, Family, Grid, Partner, Pivot, Range, Seat, Which};
+use super::family::{Clock, Directions, Family, Grid, Range};
 use super::grid;
 use super::library::Library;
+use super::place::{Place, Slot, joint_name, places};
 use crate::feature::{Binding, Dimension, Expression, Feature, Scope, Unbound, dimension_of};
-use crate::lie::{Twist, Vec3};
-use crate::machine::{JointKind, Machine};
-use crate::units::{Quantity, Unit};
-
-/// Where an effect sits on a machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Place {
-    /// On the joint of this dyad.
-    Joint(usize),
-    /// On the joint of the first dyad, depending on that of the second.
-    Pair(usize, usize),
-    /// On the frame of this dyad.
-    Frame(usize),
-    /// On what the instrument reads.
-    Measurement,
-}
-
-impl Place {
-    /// As in findings: the name of a joint or a frame, or `measurement`.
-    pub fn name(self, machine: &Machine) -> String {
-        match self {
-            Place::Joint(j) | Place::Pair(j, _) => joint_name(machine, j),
-            Place::Frame(j) => machine.dyads()[j].frame.clone(),
-            Place::Measurement => "measurement".into(),
-        }
-    }
-
-    /// The dyad, if it is on the machine.
-    pub fn dyad(self) -> Option<usize> {
-        match self {
-            Place::Joint(j) | Place::Pair(j, _) | Place::Frame(j) => Some(j),
-            Place::Measurement => None,
-        }
-    }
-
-    /// Name of the other joint of a pair.
-    pub fn partner(self, machine: &Machine) -> Option<String> {
-        match self {
-            Place::Pair(_, partner) => Some(joint_name(machine, partner)),
-            _ => None,
-        }
-    }
-}
-
-fn joint_name(machine: &Machine, j: usize) -> String {
-    machine.dyads()[j]
-        .joint
-        .as_ref()
-        .map_or_else(|| machine.dyads()[j].frame.clone(), |joint| joint.name.clone())
-}
-
-/// Where a deviation stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Slot {
-    /// `M_j exp(deviation) exp(xi_j q_j)`.
-    Before(usize),
-    /// `M_j exp(xi_j q_j) exp(deviation)`.
-    After(usize),
-    /// Added to what the instrument reads: the six numbers of the direction are weights of readings 0 to 5.
-    Reading,
-}
+use crate::lie::Twist;
+use crate::machine::Machine;
+use crate::units::Unit;
 
 /// One summand: coefficient × feature × direction in a slot.
 #[derive(Clone, Debug, PartialEq)]
@@ -197,38 +141,6 @@ impl Library {
     }
 }
 
-fn places(family: &Family, machine: &Machine) -> Vec<Place> {
-    let mut places = Vec::new();
-    let sits = |kind: JointKind| family.sits.iter().any(|seat| seat.joint() == Some(kind));
-    let along = |j: usize, k: usize| machine.branch(k) == machine.branch(j);
-    let here = |j: usize| match family.which {
-        Which::All => true,
-        Which::First => machine.joints().all(|(k, _)| k >= j || !along(j, k)),
-        Which::Last => (j + 1..machine.dyads().len()).all(|k| !along(j, k)),
-    };
-    for (j, _) in machine.joints().filter(|(j, joint)| sits(joint.kind) && here(*j)) {
-        let Some(partner) = family.partner else {
-            places.push(Place::Joint(j));
-            continue;
-        };
-        let fits = |kind: JointKind| match partner {
-            Partner::Joint => true,
-            Partner::Prismatic => kind == JointKind::Prismatic,
-            Partner::Revolute => kind == JointKind::Revolute,
-        };
-        places.extend(
-            machine.joints().filter(|(k, other)| *k != j && fits(other.kind)).map(|(k, _)| Place::Pair(j, k)),
-        );
-    }
-    if family.sits.contains(&Seat::Frame) {
-        places.extend((0..machine.dyads().len()).filter(|j| here(*j)).map(Place::Frame));
-    }
-    if family.sits.contains(&Seat::Measurement) {
-        places.push(Place::Measurement);
-    }
-    places
-}
-
 fn candidate(
     index: usize,
     family: &Family,
@@ -287,12 +199,12 @@ fn candidate(
         Feature::bind(expression, &binding(own)).map_err(|e| e.to_string()).and_then(|f| has_all(f, facts))
     };
     let (spacing, stride) = own.map_or((0.0, 0.0), |j| (facts.spacing[j], facts.stride[j]));
-    if widest_play(family).is_some_and(|width| width < stride) {
+    if family.widest_play().is_some_and(|width| width < stride) {
         return Err(grid::TOO_FAR.into());
     }
     let ranges = (family.parameters.iter())
         .map(|form| {
-            let stride = if is_taken_up(family, &form.name) { stride } else { 0.0 };
+            let stride = if family.takes_up_in(&form.name) { stride } else { 0.0 };
             grid::range(form, own_kind, travel, spacing, stride, facts)
         })
         .collect::<Result<Vec<_>, _>>()?;
@@ -436,27 +348,6 @@ fn in_each_setup(
     Ok((own_features, own_coefficients))
 }
 
-/// The widest play of which the width is stated, m or rad.
-fn widest_play(family: &Family) -> Option<f64> {
-    let mut widest: Option<f64> = None;
-    for feature in &family.features {
-        if let Expression::Play(width) = feature
-            && let Expression::Value(value, symbol) = &**width
-            && let Some(unit) = Unit::named(symbol)
-        {
-            widest = Some(widest.unwrap_or(0.0).max(unit.to_si(*value)));
-        }
-    }
-    widest
-}
-
-/// Whether a parameter is the travel in which something is taken up.
-fn is_taken_up(family: &Family, parameter: &str) -> bool {
-    let named = |e: &Expression| matches!(e, Expression::Parameter(name) if name == parameter);
-    let takes = |e: &Expression| matches!(e, Expression::TakeUp(length) if length.any(&named));
-    family.features.iter().any(|feature| feature.any(&takes))
-}
-
 /// Whether the joint of dyad `j` carries masses that the machine file states.
 fn has_masses(machine: &Machine, j: usize) -> bool {
     let beyond =
@@ -479,73 +370,4 @@ fn has_all(feature: Feature, facts: &RecordingFacts) -> Result<Feature, String> 
         }
     }
     Ok(feature)
-}
-
-/// Name, slot, direction and unit of each direction at a place.
-fn directions(
-    family: &Family,
-    place: Place,
-    machine: &Machine,
-    facts: &RecordingFacts,
-) -> Vec<(String, Slot, Twist<f64>, Dimension)> {
-    let zero = Vec3([0.0; 3]);
-    let slot = |j| match family.pivot {
-        Pivot::Before => Slot::Before(j),
-        Pivot::After => Slot::After(j),
-    };
-    let joint = place.dyad().and_then(|j| machine.dyads()[j].joint.as_ref());
-    let axis = joint.map_or(Vec3([0.0, 0.0, 1.0]), |joint| joint.axis);
-    let mut all = Vec::new();
-    for set in &family.directions {
-        if *set == Directions::Readings {
-            for (i, _) in facts.readings.iter().enumerate().filter(|(_, q)| reads(facts, **q)) {
-                let mut weights = [0.0; 6];
-                weights[i] = 1.0;
-                let unit = Dimension::of_quantity(facts.readings[i]);
-                all.push((format!("r{i}"), Slot::Reading, Twist::from_array(weights), unit));
-            }
-            continue;
-        }
-        let Some(j) = place.dyad() else { continue };
-        let mut translation =
-            |v: Vec3<f64>| all.push((named('v', v), slot(j), Twist::new(v, zero), Dimension::LENGTH));
-        match set {
-            Directions::Translations => basis().into_iter().for_each(&mut translation),
-            Directions::Across => axis.across().into_iter().for_each(&mut translation),
-            Directions::Slide => translation(axis),
-            _ => {}
-        }
-        let mut rotation =
-            |w: Vec3<f64>| all.push((named('w', w), slot(j), Twist::new(zero, w), Dimension::ANGLE));
-        match set {
-            Directions::Rotations => basis().into_iter().for_each(&mut rotation),
-            Directions::Tilts => axis.across().into_iter().for_each(&mut rotation),
-            Directions::Turn => rotation(axis),
-            _ => {}
-        }
-        if let (Directions::Along, Some(joint)) = (set, joint) {
-            all.push(("along".into(), slot(j), joint.twist(), Dimension::of_joint(joint.kind)));
-        }
-    }
-    all
-}
-
-/// Lengths, or angles where the instrument reads nothing else.
-fn reads(facts: &RecordingFacts, quantity: Quantity) -> bool {
-    quantity == Quantity::Length || !facts.readings.contains(&Quantity::Length)
-}
-
-fn basis() -> [Vec3<f64>; 3] {
-    [Vec3([1.0, 0.0, 0.0]), Vec3([0.0, 1.0, 0.0]), Vec3([0.0, 0.0, 1.0])]
-}
-
-/// `vx` for a frame's own vector, `v` with its components for another.
-fn named(letter: char, vector: Vec3<f64>) -> String {
-    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
-        if (vector.0[k].abs() - 1.0).abs() < 1e-12 {
-            return format!("{letter}{name}");
-        }
-    }
-    let [x, y, z] = vector.0;
-    format!("{letter}({x:.3},{y:.3},{z:.3})")
 }

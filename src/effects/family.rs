@@ -73,6 +73,29 @@ pub struct Family {
     pub source: String,
 }
 
+impl Family {
+    /// The widest play of which the width is stated, m or rad.
+    pub(super) fn widest_play(&self) -> Option<f64> {
+        let mut widest: Option<f64> = None;
+        for feature in &self.features {
+            if let Expression::Play(width) = feature
+                && let Expression::Value(value, symbol) = &**width
+                && let Some(unit) = Unit::named(symbol)
+            {
+                widest = Some(widest.unwrap_or(0.0).max(unit.to_si(*value)));
+            }
+        }
+        widest
+    }
+
+    /// Whether a parameter is the travel in which something is taken up.
+    pub(super) fn takes_up_in(&self, parameter: &str) -> bool {
+        let named = |e: &Expression| matches!(e, Expression::Parameter(name) if name == parameter);
+        let takes = |e: &Expression| matches!(e, Expression::TakeUp(length) if length.any(&named));
+        self.features.iter().any(|feature| feature.any(&takes))
+    }
+}
+
 /// Where an effect can sit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Seat {

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::candidate::{Candidate, Place, Slot};
+use super::candidate::Candidate;
 use super::family::{Family, Meaning, Output};
+use super::place::{Place, Slot};
 use super::quantity::in_words;
 use crate::feature::{Binding, Dimension, Expression, Feature, Samples, Unbound};
 use crate::lie::{Twist, Vec3};

@@ -101,7 +101,7 @@ impl Library {
                     |f: &Family| f.name == family.name && f.clock == family.clock && f.sits.contains(seat);
                 if form.families[..i].iter().any(twice) {
                     let what = format!("\"{}\" on {seat:?} is there twice", family.name);
-                    let fault = fault(what, "keep one of them, or give them different `sits`");
+                    let fault = fault(what, "keep one of them, or give them different `sits` or `clock`");
                     return Err(at((format!("families[{i}].name"), fault)));
                 }
             }
