@@ -20,6 +20,7 @@ mod scan;
 
 pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Skipped};
 pub use facts::RecordingFacts;
+pub(crate) use facts::by_setup;
 pub use family::{
     Clock, Directions, Family, Grid, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat,
     Size, Which,

@@ -2,7 +2,7 @@
 
 use super::pieces::{command, unit, unknown};
 use super::{AxisForm, CalibratedMachine, CalibrationForm, checked};
-use crate::effects::{Slot as Seat, StoredEffect, StoredTerm};
+use crate::effects::{Slot as Seat, StoredEffect, StoredTerm, by_setup};
 use crate::feature::{Expression, Feature, Unbound};
 use crate::machine::{Machine, MachineFault};
 use crate::recording::Recording;
@@ -112,14 +112,7 @@ impl CalibratedMachine {
         if self.effects.iter().all(|effect| !effect.of_setup) {
             return own;
         }
-        let mut setups: Vec<(&str, Vec<String>)> = Vec::new();
-        for recording in recordings {
-            let (setup, name) = (recording.header().setup.as_str(), recording.name().to_string());
-            match setups.iter_mut().find(|(known, _)| *known == setup) {
-                Some((_, names)) => names.push(name),
-                None => setups.push((setup, vec![name])),
-            }
-        }
+        let setups = by_setup(recordings);
         let terms =
             own.variation.varying.terms.len() - own.effects.iter().map(|e| e.terms.len()).sum::<usize>();
         own.variation.varying.terms.truncate(terms);

@@ -43,10 +43,11 @@ impl<'a> Effects<'a> {
         let mut held = Vec::new();
         calibrated.variation_without(|effect, features| {
             if features.iter().any(|f| f.needs_moment()) && !gone(&effect.effect, &effect.at) {
+                let when = end.map_or_else(String::new, |end| format!(", {end:.0} s"));
                 held.push(LeftOut {
                     effect: effect.effect.clone(),
                     at: effect.at.clone(),
-                    because: format!("it is as at the end of the recordings, {:.0} s", end.unwrap_or(0.0)),
+                    because: format!("it is as at the end of the recordings{when}"),
                 });
             }
             None

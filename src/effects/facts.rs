@@ -78,7 +78,7 @@ impl RecordingFacts {
             time: None,
             one_clock: true,
             begins: Vec::new(),
-            setups: Vec::new(),
+            setups: by_setup(recordings),
             samples: 0.0,
             longest: 0.0,
             step: None,
@@ -95,7 +95,6 @@ impl RecordingFacts {
             all_timed &= recording.has_time();
             facts.begins.push((recording.name().to_string(), facts.samples));
             spans.extend(facts.take(machine, recording, &mut seen, &mut strides)?);
-            facts.take_setup(recording);
             let channels = recording.extra_channels().iter().map(|c| (c.name.clone(), c.unit.quantity));
             match i {
                 0 => facts.channels = channels.collect(),
@@ -130,14 +129,6 @@ impl RecordingFacts {
             *band = (1.5 * *band).max(JITTER.0 * range).min(JITTER.1 * range);
         }
         Ok(facts)
-    }
-
-    fn take_setup(&mut self, recording: &Recording) {
-        let (setup, name) = (&recording.header().setup, recording.name().to_string());
-        match self.setups.iter_mut().find(|(known, _)| known == setup) {
-            Some((_, recordings)) => recordings.push(name),
-            None => self.setups.push((setup.clone(), vec![name])),
-        }
     }
 
     /// Takes a recording in; its first and last time, if it has any.
@@ -221,6 +212,19 @@ impl RecordingFacts {
     pub fn moves(&self, j: usize) -> bool {
         self.travel[j].is_some_and(|(from, to)| to - from > STANDSTILL)
     }
+}
+
+/// Set-ups in the order in which they are met, with the names of their recordings.
+pub(crate) fn by_setup(recordings: &[Recording]) -> Vec<(String, Vec<String>)> {
+    let mut setups: Vec<(String, Vec<String>)> = Vec::new();
+    for recording in recordings {
+        let (setup, name) = (&recording.header().setup, recording.name().to_string());
+        match setups.iter_mut().find(|(known, _)| known == setup) {
+            Some((_, names)) => names.push(name),
+            None => setups.push((setup.clone(), vec![name])),
+        }
+    }
+    setups
 }
 
 fn readings(machine: &Machine, recording: &Recording) -> Vec<Quantity> {

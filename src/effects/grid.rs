@@ -30,6 +30,7 @@ pub(super) fn range(
             }
             Ok((from, to))
         }
+        Range::Order if insides(facts).is_empty() => Err("there are too few samples to show it".into()),
         Range::Order => Ok((0.0, facts.samples)),
         Range::Time if facts.time.is_some() && !facts.one_clock => Err(MANY_CLOCKS.into()),
         Range::Time => facts.time.ok_or_else(|| NO_TIME.into()).map(|(from, to)| (0.0, to - from)),

@@ -116,10 +116,11 @@ fn outliers(diagnosis: &Diagnosis) -> Vec<String> {
             both(one.largest_m, one.largest_rad).into_iter().map(|(x, angle)| amount(x, angle)).collect();
         let shown: Vec<String> = one.lines.iter().take(FEW_LINES).map(u64::to_string).collect();
         lines.push(format!(
-            "outliers: {} of {}, off by up to {} (line {}{}), left out of the fit",
+            "outliers: {} of {}, off by up to {} ({} {}{}), left out of the fit",
             count(one.lines.len() as u64, "sample", "samples"),
             one.recording,
             by.join(" and "),
+            if one.lines.len() == 1 { "line" } else { "lines" },
             shown.join(", "),
             if one.lines.len() > FEW_LINES { " ..." } else { "" },
         ));
