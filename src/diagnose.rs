@@ -4,7 +4,9 @@
 //! geometry explains. Every family of the library at every place competes by the evidence for it; what is found is put into the
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
+mod bent;
 mod coarse;
+mod contained;
 mod evidence;
 mod finding;
 mod folds;
@@ -56,6 +58,8 @@ pub struct Request {
 
 /// Rounds of judging the noise from what is left.
 const NOISE_ROUNDS: usize = 3;
+/// So many times the machine is linearised anew, where effects are so large that it has to be.
+const MOVES: usize = 3;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
 /// An effect without which the mean square of stretches left out falls by this factor runs wild there, whatever else speaks for it.
@@ -74,7 +78,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis> {
     progress("fitting constant geometry");
     let facts = RecordingFacts::of(machine, recordings)?;
-    let linear = linear(machine, recordings, request.options, &facts.dead_bands, progress)?;
+    let mut linear = linear(machine, recordings, request.options, &facts.dead_bands, progress)?;
     let candidates = library.candidates(machine, &facts);
     let runs = noise::runs(&linear);
     let coarse = Coarse::new(&linear, candidates.all.len());
@@ -90,7 +94,8 @@ pub fn diagnose(
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
     let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
     let mut active = Vec::new();
-    for round in 1.. {
+    let (mut round, mut moves) = (1, 0);
+    loop {
         let rows =
             Rows::new(&linear, &coarse, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
         let search = Search {
@@ -113,6 +118,13 @@ pub fn diagnose(
             diagnosis.not_tried = not_tried(&candidates);
             diagnosis
         };
+        if moves < MOVES && !active.is_empty() {
+            let moved = bent::straightened(&search, &active, machine, recordings, &facts.dead_bands)?;
+            if let Some(moved) = moved {
+                (linear, noise, moves) = (moved, judged, moves + 1);
+                continue;
+            }
+        }
         if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
             let heat = search.leftover(&search.beside(&active, None)).heat;
             if heat < HOT {
@@ -124,9 +136,8 @@ pub fn diagnose(
             active = folds::useful(&search, &search.run(&active), most_wild);
             return Ok(report(&search, &active));
         }
-        noise = judged;
+        (noise, round) = (judged, round + 1);
     }
-    unreachable!("the last round reports")
 }
 
 /// Families that are met more often than this part of the most frequent one are common.

@@ -29,7 +29,7 @@ pub use fit::{
 };
 pub use information::{Functional, Information};
 pub use judge::{Figures, PieceFit};
-pub(crate) use linear::{Linear, Span, linear};
+pub(crate) use linear::{Displaced, Linear, Span, linear};
 pub use loss::Loss;
 pub use solve::{Solver, Stop};
 pub(crate) use source::{Known, Source, Sources, channel};

@@ -256,6 +256,9 @@ struct Count {
 #[test]
 fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
     let draws: usize = std::env::var("KINCAL_DRAWS").ok().and_then(|d| d.parse().ok()).unwrap_or(6);
+    let only: Option<Vec<usize>> = std::env::var("KINCAL_ONLY")
+        .ok()
+        .map(|list| list.split(',').map(|number| number.parse().expect("numbers of draws")).collect());
     let mut random = Random(2026);
     let mut sets: BTreeMap<usize, (Set, Own)> = BTreeMap::new();
     let mut table: BTreeMap<(&str, bool), Count> = BTreeMap::new();
@@ -281,6 +284,9 @@ fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
             println!("{number}: {}: geometry takes in whatever was drawn", set.name);
             continue;
         };
+        if only.as_ref().is_some_and(|only| !only.contains(&number)) {
+            continue;
+        }
         let size = effect.iter().fold(0.0f64, |m, e| m.max(e.abs()));
         let said = set.diagnosis(&set.rewritten(&command, &effect));
         let told = names(&said);

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::search::{Active, Search};
+use crate::effects::Candidate;
 
 /// Constant deviations and effects solved together.
 pub(super) struct Model {
@@ -49,15 +50,41 @@ impl Model {
         Model { columns, offsets, solution }
     }
 
+    /// What is to be added to everything constant, in units of its columns.
+    pub fn constants(&self, search: &Search) -> Vec<f64> {
+        self.solution.as_slice()[..search.rows.linear.constant.ncols()].to_vec()
+    }
+
+    /// Coefficients of effect `i` in SI, those that take part.
+    pub fn coefficients(&self, search: &Search, active: &[Active], i: usize) -> Vec<f64> {
+        let effect = &active[i];
+        let units = search.rows.units(&search.candidates[effect.candidate], &effect.score.parameters);
+        let own = &self.solution.as_slice()[self.offsets[i]..self.offsets[i] + effect.columns.ncols()];
+        own.iter().zip(units).map(|(x, unit)| x * unit * effect.score.room).collect()
+    }
+
     /// Residuals in m and rad with everything taken away. The columns of effects and constants are taken before whitening.
     pub fn residual(&self, search: &Search, active: &[Active]) -> Vec<f64> {
+        self.residual_without(search, active, |_| true)
+    }
+
+    /// The same with the constants taken away, and the effects that fulfil a condition.
+    pub fn residual_without(
+        &self,
+        search: &Search,
+        active: &[Active],
+        is_taken: impl Fn(&Candidate) -> bool,
+    ) -> Vec<f64> {
         let linear = search.rows.linear;
         let mut left = DVector::from_column_slice(&linear.residual);
         let constants = linear.constant.ncols();
         left -= &linear.constant * self.solution.rows(0, constants);
         for (i, effect) in active.iter().enumerate() {
-            if let Some(raw) = search.rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)
-            {
+            let candidate = &search.candidates[effect.candidate];
+            if !is_taken(candidate) {
+                continue;
+            }
+            if let Some(raw) = search.rows.raw(candidate, &effect.score.parameters) {
                 let count = effect.columns.ncols();
                 left -=
                     raw.columns(0, count) * effect.score.room * self.solution.rows(self.offsets[i], count);
@@ -75,8 +102,8 @@ impl Model {
         let (k, all, parameters) =
             (effect.columns.ncols(), candidate.coefficients.len(), effect.score.parameters.len());
         let scale = |c: usize| effect.score.room * units[c];
-        let mut coefficients = vec![0.0; all];
-        (0..k).for_each(|c| coefficients[c] = scale(c) * self.solution[self.offsets[i] + c]);
+        let mut coefficients = self.coefficients(search, active, i);
+        coefficients.resize(all, 0.0);
         // Derivatives by the parameters join the columns.
         let mut slopes: Vec<(usize, DVector<f64>, f64)> = Vec::new();
         for (p, parameter) in candidate.parameters.iter().enumerate().filter(|(_, p)| p.smooth) {

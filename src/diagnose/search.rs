@@ -8,6 +8,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::contained::prefer_simpler;
 use super::evidence::log_mean_exp;
 use super::folds;
 use super::leftover::{Leftover, measure};
@@ -200,6 +201,8 @@ impl Search<'_> {
             }
             rivals.sort_by(better_first);
         }
+        prefer_simpler(self, &mut rivals, close, &field.space);
+        rivals.sort_by(better_first);
         rivals
     }
 

@@ -58,6 +58,8 @@ const PARTS: f64 = 1000.0;
 const FEW: usize = 16;
 /// Targets lie farther apart than this part of the travel.
 const TARGET: f64 = 0.02;
+/// A joint that stands still from one settled position to the next is seen to move by less than this part of its usual step.
+const REST: f64 = 1e-3;
 /// Positions closer than this part of the travel are one.
 const ALIKE: f64 = 1e-6;
 
@@ -124,9 +126,9 @@ impl RecordingFacts {
             facts.places[j] = facts.travel[j].and_then(|travel| places(&positions, travel));
             facts.spacing[j] = facts.travel[j].map_or(0.0, |travel| spacing(positions, travel));
         }
-        for (band, travel) in facts.dead_bands.iter_mut().zip(&facts.travel) {
+        for ((band, travel), stride) in facts.dead_bands.iter_mut().zip(&facts.travel).zip(&facts.stride) {
             let range = travel.map_or(0.0, |(from, to)| to - from);
-            *band = (1.5 * *band).max(JITTER.0 * range).min(JITTER.1 * range);
+            *band = (1.5 * *band).max(JITTER.0 * range).min(JITTER.1 * range).max(REST * stride);
         }
         Ok(facts)
     }

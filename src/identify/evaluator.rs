@@ -268,8 +268,13 @@ impl<'a> Evaluator<'a> {
         }
         let (readings, count) =
             self.sensor.readings(&work.sweep, &self.state, self.measured_rotation(measured));
+        // Where something is carried already, by what is added to it.
+        let block = |j: usize, y_w| match self.carried.contains(&j) {
+            true => times(work.sweep.carried_block(j, y_w), deviation_jacobian(work.behind[j])),
+            false => work.sweep.carried_block(j, y_w),
+        };
         let row = |reading: &crate::sensor::Reading<f64>| {
-            (0..dyads).flat_map(|j| work.sweep.carried_block(j, reading.by_twist_w)).collect()
+            (0..dyads).flat_map(|j| block(j, reading.by_twist_w)).collect()
         };
         readings.iter().take(count).map(row).collect()
     }

@@ -1,21 +1,23 @@
 //! The calibrated machine as a linear model around its optimum: residuals, and how each reading answers to a small twist of every
 //! frame, before and behind its joint. What a diagnosis works on.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-use super::evaluator::Moment;
+use super::evaluator::{EXTRAS, Moment};
 use super::source::{Known, Sources};
-use super::unknowns::{Layout, Unknowns};
+use super::stretch::Stretch;
+use super::unknowns::{Layout, Role, Unknowns};
 use super::{
-    Evaluator, Fit, Found, Info, Model, Options, Placed, Problem, enough_for_setups, enough_to_start, fit,
+    Evaluator, Fit, Info, Model, Options, Placed, Problem, enough_for_setups, enough_to_start, fit,
     information, is_of_setup, place, settle,
 };
 use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
 use crate::machine::Machine;
-use crate::recording::Recording;
+use crate::motion::Motion;
+use crate::recording::{Chunk, Recording};
 use crate::units::Quantity;
-use crate::variation::Varying;
+use crate::variation::{Term, Varying};
 
 /// More samples than these in all are thinned out evenly.
 const MOST_SAMPLES: u64 = 40_000;
@@ -39,8 +41,10 @@ pub(crate) struct Span {
 pub(crate) struct Linear {
     pub fit: Fit,
     pub spans: Vec<Span>,
-    /// Measured less modelled, m or rad.
+    /// Measured less modelled, m or rad; with what is in `acting`.
     pub residual: Vec<f64>,
+    /// What effects do that it is linearised around, m or rad.
+    pub acting: Vec<f64>,
     /// Whether the reading is an angle.
     pub angle: Vec<bool>,
     /// Which reading of its sample a row is.
@@ -57,6 +61,20 @@ pub(crate) struct Linear {
     pub constant: DMatrix<f64>,
     /// What features see, one stretch a recording.
     pub samples: Vec<Samples>,
+    /// Where the machine is linearised.
+    unknowns: Unknowns,
+}
+
+/// Where a machine is to be linearised anew.
+pub(crate) struct Displaced {
+    /// What is to be added to everything constant, in units of [`Linear::constant`].
+    pub constants: Vec<f64>,
+    /// What deviations depend on besides, on the machine and not on the readings.
+    pub terms: Vec<Term>,
+    /// Its coefficients.
+    pub coefficients: Vec<f64>,
+    /// Features of all parts of all terms, by sample over all recordings.
+    pub features: Vec<Vec<f64>>,
 }
 
 /// Deviations may be this many tolerances large before the prior on geometry holds them: geometry is to take all that it can.
@@ -90,12 +108,105 @@ pub(crate) fn linear(
     let information = Info::new(&found.solution.normal.matrix, &layout, problem.prior, open);
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
     progress("taking rows");
-    rows(machine, &sources, &found, fit, dead_bands)
+    rows(machine, &sources, found.solution.unknowns, fit, dead_bands, &[])
 }
 
-fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[f64]) -> Result<Linear> {
-    let unknowns = &found.solution.unknowns;
-    let dyads = machine.dyads().len();
+impl Linear {
+    /// The same readings where geometry and effects have been displaced.
+    pub fn displaced(
+        &self,
+        machine: &Machine,
+        recordings: &[Recording],
+        dead_bands: &[f64],
+        to: &Displaced,
+    ) -> Result<Linear> {
+        let varying = Varying::default();
+        let sources = Sources::new(recordings, machine, &varying, &Model::default().dead_bands, &|_| {})?;
+        let layout = Layout::new(machine, &sources, &varying, 1.0);
+        let columns = Columns::new(machine, &sources);
+        let mut step = DVector::zeros(layout.len);
+        for block in &layout.blocks {
+            let first = columns.first(block.role);
+            for k in 0..block.len {
+                step[block.offset + k] = columns.scale(block.role, k) * to.constants[first + k];
+            }
+        }
+        let mut unknowns = self.unknowns.stepped(&layout, &step);
+        unknowns.varying.terms.clone_from(&to.terms);
+        unknowns.coefficients.clone_from(&to.coefficients);
+        let mut displaced = rows(machine, &sources, unknowns, self.fit.clone(), dead_bands, &to.features)?;
+        displaced.unknowns.varying = varying;
+        displaced.unknowns.coefficients.clear();
+        Ok(displaced)
+    }
+}
+
+/// Columns of everything constant: six of each dyad, that of `w` being of the first set-up, six of the frame of every further one, and
+/// of tool points, zeros and lengths that are unknown.
+struct Columns {
+    dyads: usize,
+    w: usize,
+    /// By set-up.
+    frame_unknown: Vec<bool>,
+    tool_points: usize,
+    zeros: usize,
+    lengths: usize,
+    /// By dyad, six each.
+    tolerances: Vec<f64>,
+}
+
+impl Columns {
+    fn new(machine: &Machine, sources: &Sources) -> Self {
+        let dyads = machine.dyads().len();
+        Columns {
+            dyads,
+            w: machine.w_index(),
+            frame_unknown: sources.frame_unknown.clone(),
+            tool_points: sources.tool_points.len(),
+            zeros: sources.zeros.len(),
+            lengths: sources.lengths.len(),
+            tolerances: (0..dyads).flat_map(|j| machine.tolerance(j).to_array()).collect(),
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.first(Role::Length(self.lengths))
+    }
+
+    /// First column of a block; what varies has none and stands behind the last.
+    fn first(&self, role: Role) -> usize {
+        let behind = 6 * (self.dyads + self.frame_unknown.len() - 1);
+        match role {
+            Role::Dyad(j) => 6 * j,
+            Role::Setup(0) => 6 * self.w,
+            Role::Setup(s) => 6 * (self.dyads + s - 1),
+            Role::ToolPoint(i) => behind + 3 * i,
+            Role::Zero(i) => behind + 3 * self.tool_points + i,
+            Role::Length(i) => behind + 3 * self.tool_points + self.zeros + i,
+            Role::Part { .. } | Role::Term(_) => self.count(),
+        }
+    }
+
+    /// What is possible at most of number `k` of a block, m or rad.
+    fn scale(&self, role: Role, k: usize) -> f64 {
+        match role {
+            Role::Dyad(j) => GENEROUS * self.tolerances[6 * j + k],
+            Role::Setup(s) if !self.frame_unknown[s] => GENEROUS * self.tolerances[6 * self.w + k],
+            _ => FREE,
+        }
+    }
+}
+
+/// `features`: of all parts of the terms of `unknowns`, by sample.
+fn rows(
+    machine: &Machine,
+    sources: &Sources,
+    unknowns: Unknowns,
+    fit: Fit,
+    bands: &[f64],
+    features: &[Vec<f64>],
+) -> Result<Linear> {
+    let (dyads, columns) = (machine.dyads().len(), Columns::new(machine, sources));
     let stride = sources.samples().div_ceil(MOST_SAMPLES).max(1);
     let kept = |source: &super::source::Source| source.summary.samples.div_ceil(stride) as usize;
     let count: usize = sources.all.iter().map(|s| kept(s) * s.sensor.reading_count()).sum();
@@ -103,29 +214,32 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[
         fit,
         spans: Vec::new(),
         residual: Vec::with_capacity(count),
+        acting: Vec::with_capacity(count),
         angle: Vec::with_capacity(count),
         reading: Vec::with_capacity(count),
         sample: Vec::with_capacity(count),
         lines: Vec::new(),
         before: DMatrix::zeros(count, 6 * dyads),
         carried: DMatrix::zeros(count, 6 * dyads),
-        constant: DMatrix::zeros(0, 0),
+        constant: DMatrix::zeros(count, columns.count()),
         samples: Vec::new(),
+        unknowns,
     };
-    let scales: Vec<f64> = (0..dyads).flat_map(|j| machine.tolerance(j).to_array()).collect();
-    let several = sources.setups.len();
-    let extras = 3 * sources.tool_points.len() + sources.zeros.len() + sources.lengths.len();
-    let width = 6 * dyads + 6 * (several - 1) + extras;
-    linear.constant = DMatrix::zeros(count, width);
-    let w = machine.w_index();
+    let unknowns = linear.unknowns.clone();
     for source in &sources.all {
-        let evaluator = Evaluator::new(machine, unknowns, source);
+        let evaluator = Evaluator::new(machine, &unknowns, source);
         let mut work = evaluator.workspace();
         let (readings, values) = (source.sensor.reading_count(), source.recording.value_count());
         let mut buffer = vec![0.0; readings * evaluator.width()];
         let first = linear.residual.len();
         let first_sample = linear.lines.len();
         let mut number = 0u64;
+        let displaced = (!features.is_empty()).then(|| {
+            let of = |column: &Vec<f64>| column[first_sample..first_sample + kept(source)].to_vec();
+            let features = features.iter().map(of).collect();
+            let (chunk, motion) = (Chunk::default(), Motion::default());
+            Stretch { chunk, motion, features, commands: machine.commands().len() }
+        });
         let options = FollowOptions {
             recording: source.recording.name().to_string(),
             dead_bands: bands.to_vec(),
@@ -148,37 +262,45 @@ fn rows(machine: &Machine, sources: &Sources, found: &Found, fit: Fit, bands: &[
                 let commands = machine.commands().len();
                 let q = &chunk.commands[k * commands..(k + 1) * commands];
                 let measured = &chunk.values[k * values..(k + 1) * values];
-                let residuals = evaluator.residuals(q, measured, Moment::Still, &mut work, Some(&mut buffer));
+                let moment = displaced
+                    .as_ref()
+                    .map_or(Moment::Still, |stretch| Moment::At(stretch, linear.lines.len() - first_sample));
+                let residuals = evaluator.residuals(q, measured, moment, &mut work, Some(&mut buffer));
                 let carried = evaluator.carried_rows(measured, &work);
                 for i in 0..readings {
                     let at = linear.residual.len();
                     let row = &buffer[i * evaluator.width()..(i + 1) * evaluator.width()];
-                    linear.residual.push(residuals[i]);
+                    let by_terms = &row[6 * dyads + EXTRAS..];
+                    let acting = (by_terms.iter().zip(&unknowns.coefficients)).map(|(x, c)| x * c).sum();
+                    linear.residual.push(residuals[i] + acting);
+                    linear.acting.push(acting);
                     linear.angle.push(source.quantity(machine, i) == Quantity::Angle);
                     linear.reading.push(i);
                     linear.sample.push(linear.lines.len());
                     for c in 0..6 * dyads {
                         linear.before[(at, c)] = row[c];
                         linear.carried[(at, c)] = carried[i][c];
-                        let unknown = c / 6 == w && sources.frame_unknown[source.setup];
-                        let scale = if unknown { FREE } else { GENEROUS * scales[c] };
-                        let to = match c / 6 == w && source.setup > 0 {
-                            true => 6 * dyads + 6 * (source.setup - 1) + c % 6,
-                            false => c,
+                        let role = match c / 6 {
+                            j if j == columns.w => Role::Setup(source.setup),
+                            j => Role::Dyad(j),
                         };
-                        linear.constant[(at, to)] = row[c] * scale;
+                        linear.constant[(at, columns.first(role) + c % 6)] =
+                            row[c] * columns.scale(role, c % 6);
                     }
-                    let mut put = |at_column: usize, x: f64| linear.constant[(at, at_column)] = FREE * x;
-                    let behind = 6 * dyads + 6 * (several - 1);
+                    let mut put = |role: Role, from: usize, count: usize| {
+                        for k in 0..count {
+                            linear.constant[(at, columns.first(role) + k)] =
+                                columns.scale(role, k) * row[6 * dyads + from + k];
+                        }
+                    };
                     if let Known::Unknown(p) = source.tool_point {
-                        (0..3).for_each(|k| put(behind + 3 * p + k, row[6 * dyads + k]));
+                        put(Role::ToolPoint(p), 0, 3);
                     }
-                    let behind = behind + 3 * sources.tool_points.len();
                     if let Known::Unknown(z) = source.zero {
-                        put(behind + z, row[6 * dyads + 3]);
+                        put(Role::Zero(z), 3, 1);
                     }
                     if let Known::Unknown(l) = source.length {
-                        put(behind + sources.zeros.len() + l, row[6 * dyads + 4]);
+                        put(Role::Length(l), 4, 1);
                     }
                 }
                 linear.lines.push(chunk.lines[k]);

@@ -1,0 +1,70 @@
+//! Effects so large that the machine is not linear between the one without them and the one with them.
+
+use nalgebra::DVector;
+
+use super::held_out::Model;
+use super::search::{Active, Search};
+use super::space::Space;
+use crate::effects::{Place, Slot};
+use crate::error::Result;
+use crate::identify::{Displaced, Linear};
+use crate::machine::Machine;
+use crate::recording::Recording;
+use crate::variation::{self, Term};
+
+/// Half of so much energy that no effect accounts for, in units of the noise's variance, sways the odds of names.
+const SWAYS: f64 = 10.0;
+
+/// The machine linearised anew where geometry and effects stand; `None` where it is as good as linear.
+///
+/// Residuals are again those without the effects, as they would be if the machine were linear: what is left where they stand, and to
+/// that what they do there. A step of Gauss and Newton from there finds them exactly, and so do their rivals.
+pub(super) fn straightened(
+    search: &Search,
+    active: &[Active],
+    machine: &Machine,
+    recordings: &[Recording],
+    dead_bands: &[f64],
+) -> Result<Option<Linear>> {
+    let linear = search.rows.linear;
+    let model = Model::new(search, active);
+    let mut to = Displaced {
+        constants: model.constants(search),
+        terms: Vec::new(),
+        coefficients: Vec::new(),
+        features: Vec::new(),
+    };
+    for (i, effect) in active.iter().enumerate() {
+        let candidate = &search.candidates[effect.candidate];
+        let features = candidate.over(&linear.samples, &effect.score.parameters);
+        for (coefficient, value) in candidate.coefficients.iter().zip(model.coefficients(search, active, i)) {
+            let mut parts = Vec::new();
+            for part in &coefficient.parts {
+                let slot = match part.slot {
+                    Slot::Before(j) => variation::Slot::Before(j),
+                    Slot::After(j) => variation::Slot::Carried(j),
+                    // What is added to a reading bends nothing.
+                    Slot::Reading => continue,
+                };
+                let feature = candidate.features[part.feature].clone();
+                parts.push(variation::Part { slot, direction: part.direction, feature });
+                to.features.push(features[part.feature].clone());
+            }
+            to.terms.push(Term { parts, scale: 1.0, prior: false, of_setup: false });
+            to.coefficients.push(value);
+        }
+    }
+    let displaced = linear.displaced(machine, recordings, dead_bands, &to)?;
+    let energy = |left: &[f64], beside: &Space| {
+        let mut white = DVector::zeros(left.len());
+        search.rows.whitener.apply(left, white.as_mut_slice());
+        beside.apply(&white).norm_squared()
+    };
+    let there = displaced.residual.iter().zip(&displaced.acting).map(|(all, acting)| all - acting);
+    let there: Vec<f64> = there.collect();
+    let expected = model.residual_without(search, active, |candidate| candidate.place != Place::Measurement);
+    let bend: Vec<f64> = there.iter().zip(expected).map(|(a, b)| a - b).collect();
+    let bend = energy(&bend, &search.beside(active, None));
+    let is_nearer = energy(&there, &search.base) < energy(&linear.residual, &search.base);
+    Ok((is_nearer && bend > SWAYS).then_some(displaced))
+}

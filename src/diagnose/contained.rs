@@ -1,0 +1,74 @@
+//! Names that say the same as a wider one that adds next to nothing: a scale that is off by 3000 ppm and bends by 10 is a scale error.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::search::{Rival, Search};
+use super::space::Space;
+
+/// What a wider name adds is next to nothing below this part of what it does, root mean square in m and rad.
+const NOTHING: f64 = 0.03;
+/// The simpler one takes at least this part of the energy.
+const NEARLY_ALL: f64 = 0.9;
+/// By so much is it then likelier than the wider one, as a logarithm of odds.
+const LIKELIER: f64 = 2.0;
+/// Columns are contained that leave no more of themselves than this part, and the same as others that leave this part of their square.
+const CONTAINED: f64 = 1e-4;
+const SAME: f64 = 1e-10;
+
+/// Puts simpler names above the best one where that contains them and hardly departs from them. `close`: those that come into question.
+pub(super) fn prefer_simpler(search: &Search, rivals: &mut [Rival], close: usize, space: &Space) {
+    let Some(best) = rivals.first().cloned() else { return };
+    let place = |r: &Rival| search.candidates[r.candidate].place;
+    let is_simpler = |r: &Rival| {
+        place(r) == place(&best)
+            && r.score.coefficients < best.score.coefficients
+            && r.score.gain >= NEARLY_ALL * best.score.gain
+    };
+    let simpler: Vec<usize> = (1..close.min(rivals.len())).filter(|i| is_simpler(&rivals[*i])).collect();
+    if simpler.is_empty() {
+        return;
+    }
+    let raw = |r: &Rival| -> Option<DMatrix<f64>> {
+        let all = search.rows.raw(&search.candidates[r.candidate], &r.score.parameters)?;
+        Some(all.columns(0, r.score.coefficients).into_owned())
+    };
+    let Some((wide, effect)) = raw(&best).zip(search.enter(&best, space)) else { return };
+    let does = DMatrix::from_columns(&[&wide * &effect.solution]);
+    // Where zero is, is a matter of constant geometry.
+    let constant: Vec<DVector<f64>> = (search.candidates[best.candidate].coefficients.iter())
+        .flat_map(|c| &c.parts)
+        .map(|part| DVector::from_column_slice(&search.rows.answer(part.slot, part.direction)))
+        .collect();
+    let constant = DMatrix::from_columns(&constant);
+    let (does, wide) = (beside(&does, &constant), beside(&wide, &constant));
+    for i in simpler {
+        let Some(own) = raw(&rivals[i]) else { continue };
+        let own = beside(&own, &constant);
+        if left(&own, &wide) < CONTAINED && left(&does, &own) < NOTHING {
+            rivals[i].weight = rivals[i].weight.max(best.weight + LIKELIER);
+        }
+    }
+}
+
+/// What is left of columns by others.
+fn beside(columns: &DMatrix<f64>, others: &DMatrix<f64>) -> DMatrix<f64> {
+    let lengths: Vec<f64> = others.column_iter().map(|c| c.norm()).collect();
+    let longest = lengths.iter().copied().fold(0.0, f64::max);
+    let kept: Vec<usize> = (0..lengths.len()).filter(|i| lengths[*i] > SAME * longest).collect();
+    let scaled: Vec<DVector<f64>> = kept.iter().map(|i| others.column(*i) / lengths[*i]).collect();
+    if scaled.is_empty() {
+        return columns.clone();
+    }
+    let scaled = DMatrix::from_columns(&scaled);
+    let eigen = scaled.tr_mul(&scaled).symmetric_eigen();
+    let most = eigen.eigenvalues.max();
+    let kept: Vec<usize> = (0..scaled.ncols()).filter(|i| eigen.eigenvalues[*i] > SAME * most).collect();
+    let mut basis = scaled * eigen.eigenvectors.select_columns(&kept);
+    (basis.column_iter_mut().zip(&kept)).for_each(|(mut c, i)| c /= eigen.eigenvalues[*i].sqrt());
+    columns - &basis * basis.tr_mul(columns)
+}
+
+/// Part of columns that others do not span, by their norms.
+fn left(columns: &DMatrix<f64>, others: &DMatrix<f64>) -> f64 {
+    beside(columns, others).norm() / columns.norm().max(f64::MIN_POSITIVE)
+}
