@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::search::{Rival, Search};
-use super::space::Space;
+use super::space::{Space, gram};
 
 /// What a wider name adds is next to nothing below this part of what it does, root mean square in m and rad.
 const NOTHING: f64 = 0.03;
@@ -60,12 +60,12 @@ fn beside(columns: &DMatrix<f64>, others: &DMatrix<f64>) -> DMatrix<f64> {
         return columns.clone();
     }
     let scaled = DMatrix::from_columns(&scaled);
-    let eigen = scaled.tr_mul(&scaled).symmetric_eigen();
+    let eigen = gram(&scaled, &scaled).symmetric_eigen();
     let most = eigen.eigenvalues.max();
     let kept: Vec<usize> = (0..scaled.ncols()).filter(|i| eigen.eigenvalues[*i] > SAME * most).collect();
     let mut basis = scaled * eigen.eigenvectors.select_columns(&kept);
     (basis.column_iter_mut().zip(&kept)).for_each(|(mut c, i)| c /= eigen.eigenvalues[*i].sqrt());
-    columns - &basis * basis.tr_mul(columns)
+    columns - &basis * gram(&basis, columns)
 }
 
 /// Part of columns that others do not span, by their norms.

@@ -404,14 +404,16 @@ fn odds<'a>(
     let plain = |r: &Rival| (r.weight - own.weight).exp();
     let visible = VISIBLE * search.rows.whitener.count() as f64;
     let shift = 1.0 + (SHIFT * own.score.gain).min(visible) / heat;
+    // Another name at its place, or the same at another place.
+    let is_alike =
+        |r: &Rival| r.candidate == own.candidate || (place(r) == place(own)) != (effect(r) == effect(own));
     let shifted = |r: &Rival| {
-        let is_alike = place(r) == place(own) && (effect(r) != effect(own) || r.candidate == own.candidate);
-        if is_alike { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
+        if is_alike(r) { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
     };
     let nothing = (-own.weight).exp();
     let (all, all_alike) =
         (rivals.iter().map(plain).sum::<f64>() + nothing, rivals.iter().map(shifted).sum::<f64>());
-    let beside = rivals.iter().filter(|r| place(r) == place(own)).map(plain).sum::<f64>() / all;
+    let beside = rivals.iter().filter(|r| is_alike(r)).map(plain).sum::<f64>() / all;
     let probability = |r: &Rival| (1.0 - unsure) * plain(r) / all + unsure * beside * shifted(r) / all_alike;
     let is_common = |r: &Rival| search.commonness[r.candidate] > search.commonness[own.candidate] - RARER;
     let listed = |r: &Rival| {

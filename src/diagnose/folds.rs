@@ -4,6 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::finding::{Diagnosis, HeldOutPair, HeldOutRms, rms_of};
 use super::search::{Active, Search};
+use super::space::gram;
 
 /// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
 const FOLDS: usize = 5;
@@ -144,7 +145,7 @@ fn grams(
         let own: Vec<usize> = (0..owner.len()).filter(|row| owner[*row] == fold).collect();
         let columns = white.select_rows(&own);
         let residual = residual.select_rows(&own);
-        (columns.tr_mul(&columns), columns.tr_mul(&residual))
+        (gram(&columns, &columns), columns.tr_mul(&residual))
     };
     (0..FOLDS).map(one).collect()
 }

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::search::{Active, Search};
+use super::space::gram;
 use crate::effects::Candidate;
 
 /// Constant deviations and effects solved together.
@@ -43,7 +44,7 @@ impl Model {
                 columns.columns_mut(at, own.ncols()).copy_from(own);
             }
         }
-        let gram = columns.tr_mul(&columns) + DMatrix::identity(columns.ncols(), columns.ncols());
+        let gram = gram(&columns, &columns) + DMatrix::identity(columns.ncols(), columns.ncols());
         let identity = || DMatrix::identity(gram.nrows(), gram.nrows());
         let solution =
             gram.clone().try_inverse().unwrap_or_else(identity) * columns.tr_mul(&search.rows.residual);
@@ -135,7 +136,7 @@ impl Model {
             wide = wide.insert_columns(at, effect.shape.ncols(), 0.0);
             wide.columns_mut(at, effect.shape.ncols()).copy_from(&(&effect.shape * shape.max(UNKNOWN_SHAPE)));
         }
-        let gram = wide.tr_mul(&wide) + DMatrix::identity(wide.ncols(), wide.ncols());
+        let gram = gram(&wide, &wide) + DMatrix::identity(wide.ncols(), wide.ncols());
         let Some(inverse) = gram.try_inverse() else { return Solved { coefficients, covariance } };
         let place = |x: usize| -> (usize, f64) {
             if x < k { (own(x), scale(x)) } else { (at + x - k, slopes[x - k].2) }

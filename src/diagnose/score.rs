@@ -62,7 +62,7 @@ const ROOM: f64 = 4.0;
 const ROOM_BEYOND: f64 = 2.0;
 
 /// Numbers of columns that are built at a time: they stay in a core's cache.
-const BATCH: usize = 1 << 19;
+const BATCH: usize = 1 << 20;
 
 impl<'a> Rows<'a> {
     pub fn new(linear: &'a Linear, coarse: &'a Coarse, whitener: Whitener) -> Self {
@@ -274,7 +274,10 @@ impl<'a> Rows<'a> {
             let toward = joined.tr_mul(left);
             for (b, i) in built.iter().enumerate() {
                 let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
-                let gram = columns.tr_mul(&columns) - own.tr_mul(&own);
+                let gram = match k > WIDE {
+                    true => columns.transpose() * columns - own.transpose() * own,
+                    false => columns.tr_mul(&columns) - own.tr_mul(&own),
+                };
                 let g = toward.rows(b * k, k).into_owned();
                 let all: Vec<Worth> =
                     lengths.iter().map(|length| evidence(&gram, &g, *length, heat)).collect();
@@ -330,6 +333,8 @@ struct Best {
     room: f64,
 }
 
+/// More columns than this are multiplied by blocks.
+const WIDE: usize = 5;
 /// Grids larger than this are screened by a spectrum, where the features are sines.
 const WAVES: usize = 64;
 /// Best points that are looked at finely.

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::score::Rows;
 use super::search::Active;
+use super::space::gram;
 use crate::effects::{Candidate, Slot};
 use crate::feature::{Feature, Samples};
 use crate::lie::Twist;
@@ -86,7 +87,7 @@ fn whitened(rows: &Rows, answers: &[Vec<f64>], curves: &[Vec<f64>], amplitude: f
 
 /// Columns with the same covariance `S Sᵀ`, without the combinations of them that noise hides.
 fn thinned(columns: DMatrix<f64>) -> DMatrix<f64> {
-    let eigen = columns.tr_mul(&columns).symmetric_eigen();
+    let eigen = gram(&columns, &columns).symmetric_eigen();
     let kept: Vec<usize> = (0..columns.ncols()).filter(|i| eigen.eigenvalues[*i] > HIDDEN * HIDDEN).collect();
     columns * eigen.eigenvectors.select_columns(&kept)
 }

@@ -50,11 +50,13 @@ impl Space {
         }
         let mut mc = columns.clone();
         mc.gemm(-1.0, &self.w, &self.along(&columns.as_view()), 1.0);
-        let inner = DMatrix::identity(columns.ncols(), columns.ncols()) + columns.tr_mul(&mc);
+        let mut inner = gram(columns, &mc);
+        (0..inner.nrows()).for_each(|i| inner[(i, i)] += 1.0);
         let Some(factor) = Cholesky::new(inner) else { return self.clone() };
         // W = M C L⁻ᵀ, so that Wᵀ = L⁻¹ (M C)ᵀ.
-        let mut added = mc.transpose();
-        factor.l_dirty().solve_lower_triangular_mut(&mut added);
+        let mut back = DMatrix::identity(columns.ncols(), columns.ncols());
+        factor.l_dirty().solve_lower_triangular_mut(&mut back);
+        let added = back * mc.transpose();
         let (old, new) = (self.wt.nrows(), added.nrows());
         let mut wt = self.wt.clone().resize_vertically(old + new, 0.0);
         wt.rows_mut(old, new).copy_from(&added);
@@ -65,7 +67,8 @@ impl Space {
     pub fn worth(&self, columns: &DMatrix<f64>, left: &DVector<f64>, heat: f64) -> f64 {
         let mut mc = columns.clone();
         mc.gemm(-1.0, &self.w, &self.along(&columns.as_view()), 1.0);
-        let inner = DMatrix::identity(columns.ncols(), columns.ncols()) + columns.tr_mul(&mc) / heat;
+        let mut inner = gram(columns, &mc) / heat;
+        (0..inner.nrows()).for_each(|i| inner[(i, i)] += 1.0);
         let Some(factor) = Cholesky::new(inner) else { return 0.0 };
         let toward = columns.tr_mul(left) / heat;
         0.5 * toward.dot(&factor.solve(&toward))
@@ -89,6 +92,11 @@ impl Space {
     pub fn along(&self, c: &DMatrixView<f64>) -> DMatrix<f64> {
         &self.wt * c
     }
+}
+
+/// `aᵀ b` of tall matrices, by blocks that stay in a core's cache; nalgebra's `tr_mul` goes column by column.
+pub(super) fn gram(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    a.transpose() * b
 }
 
 #[cfg(test)]
