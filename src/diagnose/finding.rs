@@ -183,7 +183,7 @@ const LISTED: f64 = 0.05;
 /// Where shapes make up less than this part of all, the names are no patches, whatever surprises.
 const ODD_SHAPE: f64 = 0.05;
 /// How often the true shape of an effect is none of its family's, and the part of its energy by which that may shift the odds of other
-/// names for the same place.
+/// names for the same place, and of its own name at other places.
 const UNSURE: f64 = 0.2;
 const SHIFT: f64 = 0.002;
 /// Names that are so likely besides the best one, as their weights may shift, are listed too.
