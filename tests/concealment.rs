@@ -35,23 +35,12 @@ impl Random {
 
 /// What a law of this file may depend on: one instant of a recording.
 struct Instant<'a> {
-    /// Time since the first sample of all, s.
-    time: f64,
     /// The command in question, m or rad.
     q: f64,
-    /// Its exact rate, m/s or rad/s.
-    v: f64,
     /// All commands.
     all: &'a [f64],
     /// Whether the coolant runs, 0 or 1.
     coolant: f64,
-}
-
-impl Instant<'_> {
-    /// Side from which play has been taken up: no joint ever rests on these paths.
-    fn side(&self) -> f64 {
-        self.v.signum()
-    }
 }
 
 /// What an effect adds to the displacement of one command, m or rad.
@@ -105,12 +94,10 @@ fn record(folder: &Path, stem: &str, law: &Law, sigma_m: f64, seed: u64) -> (Pat
         for k in 0..SAMPLES {
             let time = start + k as f64 * STEP_S;
             let q = pose(time);
-            let (before, after) = (pose(time - 1e-4), pose(time + 1e-4));
-            let v = (after[own] - before[own]) / 2e-4;
             // Now and then, by no rhythm.
             let coolant = f64::from(u8::from((0.9 * time).sin() + (0.37 * time + 1.0).sin() > 0.3));
             let mut moved = q.clone();
-            moved[own] += (law.adds)(&Instant { time, q: q[own], v, all: &q, coolant });
+            moved[own] += (law.adds)(&Instant { q: q[own], all: &q, coolant });
             let p = chain.w_from_t(&moved).transform(TARGET_T).0.map(|x| x + sigma_m * random.normal());
             let numbers = q.iter().copied().chain([coolant]).chain(p).map(|x| format!("{x:.9}"));
             text += &format!("{time:.3},{}\n", numbers.collect::<Vec<_>>().join(","));
