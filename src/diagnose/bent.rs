@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::held_out::Model;
 use super::search::{Active, Search};
 use super::space::Space;
-use crate::effects::{Place, Slot};
+use crate::effects::{Candidate, Slot};
 use crate::error::Result;
 use crate::identify::{Displaced, Linear};
 use crate::machine::Machine;
@@ -62,9 +62,14 @@ pub(super) fn straightened(
     };
     let there = displaced.residual.iter().zip(&displaced.acting).map(|(all, acting)| all - acting);
     let there: Vec<f64> = there.collect();
-    let expected = model.residual_without(search, active, |candidate| candidate.place != Place::Measurement);
+    let expected = model.residual_without(search, active, moves_machine);
     let bend: Vec<f64> = there.iter().zip(expected).map(|(a, b)| a - b).collect();
     let bend = energy(&bend, &search.beside(active, None));
     let is_nearer = energy(&there, &search.base) < energy(&linear.residual, &search.base);
     Ok((is_nearer && bend > SWAYS).then_some(displaced))
+}
+
+/// Whether it is on the machine: a delay of all readings is one of all joints.
+fn moves_machine(candidate: &Candidate) -> bool {
+    candidate.coefficients.iter().flat_map(|c| &c.parts).any(|part| part.slot != Slot::Reading)
 }
