@@ -405,8 +405,8 @@ fn odds<'a>(
     let visible = VISIBLE * search.rows.whitener.count() as f64;
     let shift = 1.0 + (SHIFT * own.score.gain).min(visible) / heat;
     // Another name at its place, or the same at another place.
-    let is_alike =
-        |r: &Rival| r.candidate == own.candidate || (place(r) == place(own)) != (effect(r) == effect(own));
+    let is_alike = |r: &Rival| place(r) == place(own) || effect(r) == effect(own);
+    let is_same = |r: &Rival| place(r) == place(own) && effect(r) == effect(own);
     let shifted = |r: &Rival| {
         if is_alike(r) { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
     };
@@ -419,7 +419,7 @@ fn odds<'a>(
     let listed = |r: &Rival| {
         probability(r) > LISTED * probability(own) || !is_plain && shifted(r) > ALIKE && is_common(r)
     };
-    rivals.iter().map(|r| (r, probability(r), r.candidate != own.candidate && listed(r))).collect()
+    rivals.iter().map(|r| (r, probability(r), !is_same(r) && listed(r))).collect()
 }
 
 fn confusable(

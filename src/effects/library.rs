@@ -97,11 +97,19 @@ impl Library {
         for (i, family) in form.families.iter().enumerate() {
             check(family).map_err(|(path, fault)| at((join(&format!("families[{i}]"), &path), fault)))?;
             for seat in &family.sits {
-                let twice =
-                    |f: &Family| f.name == family.name && f.clock == family.clock && f.sits.contains(seat);
+                let parameters = |f: &Family| f.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
+                let twice = |f: &Family| {
+                    f.name == family.name
+                        && f.clock == family.clock
+                        && f.sits.contains(seat)
+                        && parameters(f) == parameters(family)
+                };
                 if form.families[..i].iter().any(twice) {
                     let what = format!("\"{}\" on {seat:?} is there twice", family.name);
-                    let fault = fault(what, "keep one of them, or give them different `sits` or `clock`");
+                    let fault = fault(
+                        what,
+                        "keep one of them, or give them different `sits`, `clock` or `parameters`",
+                    );
                     return Err(at((format!("families[{i}].name"), fault)));
                 }
             }
