@@ -279,6 +279,7 @@ impl<'a> Rows<'a> {
                     false => columns.tr_mul(&columns) - own.tr_mul(&own),
                 };
                 let g = toward.rows(b * k, k).into_owned();
+                let lengths = if has_overtones(candidate, &grid[*i]) { &lengths[..] } else { &lengths[..1] };
                 let all: Vec<Worth> =
                     lengths.iter().map(|length| evidence(&gram, &g, *length, heat)).collect();
                 let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
@@ -400,7 +401,23 @@ const ROUNDING: f64 = 1e-12;
 
 /// Whether what it multiplies is a number without a unit.
 fn is_of_number(coefficient: &Coefficient) -> bool {
-    [Dimension::LENGTH, Dimension::ANGLE].contains(&coefficient.dimension)
+    is_travel(coefficient.dimension)
+}
+
+fn is_travel(dimension: Dimension) -> bool {
+    [Dimension::LENGTH, Dimension::ANGLE].contains(&dimension)
+}
+
+/// Whether a wave's overtone is within its family's range too: what is finer than positions lie apart looks like something coarse.
+fn has_overtones(candidate: &Candidate, at: &[f64]) -> bool {
+    let is_wave = candidate.features.iter().all(|f| f.wave().is_some());
+    match (&candidate.parameters[..], at) {
+        ([order], [x]) if is_wave && order.dimension == Dimension::ONE => {
+            order.whole || 2.0 * x <= order.range.1
+        }
+        ([period], [x]) if is_wave && is_travel(period.dimension) => 0.5 * x >= period.range.0,
+        _ => true,
+    }
 }
 
 /// How many coefficients may take part: all, or those of the first features from `least` on.
