@@ -27,6 +27,7 @@ mod stretch;
 mod traces;
 mod unexplained;
 mod waves;
+mod whitener;
 
 pub use finding::{Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size};
 pub use not_tried::NotTried;
@@ -44,10 +45,11 @@ use crate::identify::{Linear, Options, linear};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use coarse::Coarse;
-use noise::{Noise, Whitener};
+use noise::Noise;
 use not_tried::not_tried;
 use score::Rows;
 use search::{Active, Search};
+use whitener::Whitener;
 
 /// What a diagnosis is asked.
 #[derive(Clone, Debug, Default)]
@@ -62,6 +64,8 @@ const NOISE_ROUNDS: usize = 3;
 const MOVES: usize = 3;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
+/// What is left counts as more than noise beyond this many standard deviations of chance.
+const BEYOND_NOISE: f64 = 5.0;
 /// An effect without which the mean square of stretches left out falls by this factor runs wild there, whatever else speaks for it.
 const WILD: f64 = 2.0;
 
@@ -94,7 +98,7 @@ pub fn diagnose(
     // What is left is noise, once everything else is modelled: the noise is judged anew from it.
     let mut noise = noise_of(&linear, &linear.residual, &runs, &out, &facts);
     let mut active = Vec::new();
-    let (mut round, mut moves) = (1, 0);
+    let (mut round, mut moves, mut forgot) = (1, 0, false);
     loop {
         let rows =
             Rows::new(&linear, &coarse, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
@@ -122,6 +126,14 @@ pub fn diagnose(
             let moved = bent::straightened(&search, &active, machine, recordings, &facts.dead_bands)?;
             if let Some(moved) = moved {
                 (linear, noise, moves) = (moved, judged, moves + 1);
+                continue;
+            }
+        }
+        if !forgot && noise.iter().any(Noise::is_long) {
+            // So long a memory may be a misfit that was taken for noise.
+            let left = search.leftover(&search.beside(&active, None));
+            if left.beyond > BEYOND_NOISE {
+                (noise, forgot) = (noise.iter().map(Noise::shortened).collect(), true);
                 continue;
             }
         }
@@ -176,7 +188,7 @@ fn noise_of(
         }
         match !smooth && facts.time.is_some() && noise::without_order(linear) {
             true => noise::remembered(left, &own, out),
-            false => noise::estimate(left, &own, out, smooth),
+            false => noise::estimate(left, &own, out, smooth, linear.step(angle)),
         }
     };
     let (length, angle) = (estimate(false), estimate(true));

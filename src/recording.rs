@@ -21,6 +21,7 @@ mod fault;
 mod header;
 mod lines;
 mod reader;
+mod step;
 mod summary;
 mod text;
 
@@ -28,6 +29,7 @@ pub use column::{Channel, Column, Role};
 pub use fault::RecordingFault;
 pub use header::{Header, Measurement, NominalLength, Sigma, ToolPoint};
 pub use reader::{Block, Chunk, Chunks, Row, Rows};
+pub(crate) use step::step_of;
 pub use summary::Summary;
 
 use std::fs::File;

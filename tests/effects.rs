@@ -160,12 +160,11 @@ fn every_family_is_finite_at_every_place_of_every_machine() {
             assert!(!skipped.reason.is_empty(), "{stem}: {}", skipped.effect);
         }
     }
-    // A recording of a few seconds is too short for what takes eight hours, its samples are too far apart for a grating, and it is of one
-    // set-up.
+    // A recording of a few seconds is too short for what takes eight hours, and it is of one set-up.
     let missing: Vec<&str> = library.names().into_iter().filter(|n| !seen.contains(*n)).collect();
     let of_setups = ["homing_error", "scale_drift", "ground_compliance", "remounting_error"];
     let missing: Vec<&str> = missing.into_iter().filter(|name| !of_setups.contains(name)).collect();
-    assert_eq!(missing, ["interpolation_error", "daily_drift"]);
+    assert_eq!(missing, ["daily_drift"]);
 }
 
 #[test]

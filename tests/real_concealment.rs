@@ -49,6 +49,8 @@ impl Random {
     }
 }
 
+/// No joint that follows its command is farther off, rad or m: six degrees, ten centimetres.
+const POSSIBLE: f64 = 0.1;
 /// Most that a wave may change per change of the command.
 const STEEP: f64 = 0.3;
 
@@ -353,7 +355,12 @@ fn sized(
         if concealed.steepest() * size > STEEP {
             continue;
         }
-        return Some((commands[c].clone(), concealed, unit.iter().map(|e| size * e).collect()));
+        let effect: Vec<f64> = unit.iter().map(|e| size * e).collect();
+        // Nor is what takes more than a machine could show to be seen at all.
+        if effect.iter().any(|e| e.abs() > POSSIBLE) {
+            continue;
+        }
+        return Some((commands[c].clone(), concealed, effect));
     }
     None
 }

@@ -220,8 +220,9 @@ pub(super) fn report(
     let shares = search.shares(active);
     let (left, total) = (&shares.left, shares.total());
     let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
-    let memory = noise.iter().map(|n| (1.0 + n.rho) / (1.0 - n.rho)).fold(1.0, f64::max);
+    let memory = noise.iter().map(Noise::memory).fold(1.0, f64::max);
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
+        || left.beyond > CHANCE && search.in_motion && active.len() >= search.most()
         || shares.is_misshapen(active.len())
         || shares.shapes > ODD_SHAPE * total
             && surprise > CHANCE * left.heat.max(1.0) * deviation

@@ -64,6 +64,13 @@ pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
     without.filter(|(_, score)| *score > all).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
 }
 
+/// Of each effect, whether stretches that are left out are foretold better without it, (68).
+fn foretold(search: &Search, active: &[Active]) -> Option<Vec<bool>> {
+    let normal = Normal::new(search, active)?;
+    let all = normal.foretold(None)?;
+    Some((0..active.len()).map(|i| normal.foretold(Some(i)).is_some_and(|without| without > all)).collect())
+}
+
 /// Whitened normal equations of each fold, with everything that an effect brings along: states and shape.
 struct Normal {
     folds: Vec<(DMatrix<f64>, DVector<f64>)>,
@@ -151,11 +158,15 @@ fn grams(
 }
 
 /// What predicts stretches that were left out no worse: effects without which their mean square would fall by more than this factor
-/// go, the worst first; and all of them, where together they do no better than geometry alone.
+/// go, the worst first; and all of them, where together they do no better than geometry alone. In motion, where noise is known, an
+/// effect stays of which the other stretches foretell how little they know of it in the one that was left out.
 pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Active> {
     let mut kept = active.to_vec();
     while let Some(folds) = Folds::new(search, &kept) {
-        let better = folds.without_each(search, &kept).into_iter().enumerate().filter(|(_, b)| *b > factor);
+        let foretold = search.in_motion.then(|| foretold(search, &kept)).flatten();
+        let is_harm = |i: usize| foretold.as_ref().is_none_or(|harms| harms[i]);
+        let each = folds.without_each(search, &kept).into_iter().enumerate();
+        let better = each.filter(|(i, b)| *b > factor && is_harm(*i));
         match better.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((worst, _)) => drop(kept.remove(worst)),
             None if folds.without_all(search, &kept) > factor => kept.clear(),

@@ -7,34 +7,47 @@ use std::collections::HashMap;
 
 use crate::identify::{Linear, Span};
 
-/// Noise of one kind of reading: first-order autoregressive.
+/// Noise of one kind of reading: first-order autoregressive, and rounding to the step of its readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Noise {
     /// Standard deviation, m or rad.
     pub sigma: f64,
-    /// Correlation of neighbouring readings, 0 up to below 1.
+    /// Correlation of neighbouring readings, rounding left aside, 0 up to below 1.
     pub rho: f64,
+    /// Standard deviation of the rounding, which no reading remembers, m or rad.
+    pub rounding: f64,
 }
 
 impl Noise {
+    /// Variance of the mean of many readings over that of as many independent ones.
+    pub fn memory(&self) -> f64 {
+        let rounding = (self.rounding / self.sigma).powi(2);
+        (1.0 - rounding) * (1.0 + self.rho) / (1.0 - self.rho) + rounding
+    }
+
+    /// Whether it remembers so long that a misfit may have been taken for it.
+    pub fn is_long(&self) -> bool {
+        self.rho > LONG
+    }
+
+    /// The same differences from reading to reading, with a shorter memory.
+    pub fn shortened(&self) -> Noise {
+        let rounding = self.rounding.powi(2);
+        let fresh = (self.sigma.powi(2) - rounding) * (1.0 - self.rho);
+        match self.is_long() {
+            true => {
+                Noise { sigma: (fresh / (1.0 - LONG) + rounding).sqrt(), rho: LONG, rounding: self.rounding }
+            }
+            false => *self,
+        }
+    }
+
     /// Whether the difference matters to nothing.
     pub fn is_close(&self, other: &Noise) -> bool {
         (self.sigma / other.sigma).ln().abs() < 0.04 && (self.rho - other.rho).abs() < 0.04
     }
 }
 
-/// Turns rows into independent ones of unit variance.
-#[derive(Clone, Debug)]
-pub(super) struct Whitener {
-    /// Row before, where noise is remembered from it.
-    previous: Vec<u32>,
-    rho: Vec<f64>,
-    scale: Vec<f64>,
-    /// Rows that are left out.
-    pub out: Vec<bool>,
-}
-
-const NONE: u32 = u32::MAX;
 /// Beyond so many standard deviations of its surroundings a reading is an outlier.
 const OUTLIER: f64 = 5.0;
 /// So many readings on either side tell how rough it is around one.
@@ -43,10 +56,12 @@ const AROUND: usize = 15;
 const FINEST: f64 = 1e-10;
 /// Two estimates of the memory that differ by less tell of the same noise.
 const ALIKE: f64 = 0.1;
-/// Noise that remembers less than this is as good as white.
-const FORGETFUL: f64 = 0.2;
 /// Longest memory that is told from a drift.
 const MOST_RHO: f64 = 0.97;
+/// Memory that is common among instruments.
+const LONG: f64 = 0.7;
+/// Rounding is at most this part of the variance: what is rounded more coarsely has no noise to speak of besides, and rounding is not white.
+const MOST_ROUNDED: f64 = 0.7;
 
 /// Rows of one reading of one recording, in their order, without pauses.
 pub(super) fn runs(linear: &Linear) -> Vec<Vec<usize>> {
@@ -156,40 +171,50 @@ fn structure(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], lag: usize) -
     Some(mean)
 }
 
-/// Correlation of neighbouring readings, as they are.
-fn neighbours(residual: &[f64], runs: &[&Vec<usize>], out: &[bool]) -> f64 {
+/// Correlation of neighbouring readings, as they are, less what rounding (its variance) adds to each.
+fn neighbours(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], rounding: f64) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
     for pair in runs.iter().flat_map(|run| run.windows(2)).filter(|pair| !out[pair[0]] && !out[pair[1]]) {
         let (a, b) = (residual[pair[0]], residual[pair[1]]);
         products += a * b;
-        squares += 0.5 * (a * a + b * b);
+        squares += 0.5 * (a * a + b * b) - rounding;
     }
     if squares > 0.0 { products / squares } else { 0.0 }
 }
 
-/// Noise of some runs that share it. `smooth`: whether the path is followed continuously, so that neighbours see the same misfit.
-pub(super) fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smooth: bool) -> Noise {
+/// Noise of some runs that share it. `smooth`: whether the path is followed continuously, so that neighbours see the same misfit;
+/// `step`: of the readings, m or rad.
+pub(super) fn estimate(
+    residual: &[f64],
+    runs: &[&Vec<usize>],
+    out: &[bool],
+    smooth: bool,
+    step: f64,
+) -> Noise {
     let all: Vec<f64> =
         runs.iter().flat_map(|run| run.iter()).filter(|r| !out[**r]).map(|r| residual[*r]).collect();
     let total = (all.iter().map(|r| r * r).sum::<f64>() / all.len().max(1) as f64).max(FINEST * FINEST);
-    let white = Noise { sigma: total.sqrt(), rho: 0.0 };
+    let white = Noise { sigma: total.sqrt(), rho: 0.0, rounding: 0.0 };
     if !smooth {
         return white;
     }
     let [Some(one), Some(two), Some(three)] = [1, 2, 3].map(|lag| structure(residual, runs, out, lag)) else {
         return white;
     };
+    let rounding = (step * step / 12.0).min(MOST_ROUNDED * one);
+    let [one, two, three] = [one, two, three].map(|v| v - rounding);
     // (60): V_k = σ² (1 - ρ^k). Two estimates of ρ from the first three; misfits only raise them, so the smaller counts.
     let by_two = two / one - 1.0;
     let ratio = (three / one - 1.0).max(0.0);
     let by_three = 0.5 * ((1.0 + 4.0 * ratio).sqrt() - 1.0);
     let least = by_two.min(by_three);
     // Where that comes to nearly the same, neighbours as they are say it most exactly.
-    let direct = neighbours(residual, runs, out);
+    let direct = neighbours(residual, runs, out, rounding);
     let rho = if (direct - least).abs() < ALIKE { direct } else { least }.clamp(0.0, MOST_RHO);
     let rho = if rho < 0.03 { 0.0 } else { rho };
-    let sigma2 = if rho == 0.0 { one } else { one / (1.0 - rho) };
-    Noise { sigma: sigma2.min(1.05 * total).sqrt().max(FINEST), rho }
+    let sigma2 = rounding + if rho == 0.0 { one } else { one / (1.0 - rho) };
+    let rounding = if rho == 0.0 { 0.0 } else { rounding.sqrt() };
+    Noise { sigma: sigma2.min(1.05 * total).sqrt().max(FINEST), rho, rounding }
 }
 
 /// Neighbours that go together by less than this are in no order.
@@ -215,9 +240,9 @@ pub(super) fn without_order(linear: &Linear) -> bool {
 
 /// Noise of settled positions without order: what is left, and what neighbours have in common.
 pub(super) fn remembered(residual: &[f64], runs: &[&Vec<usize>], out: &[bool]) -> Noise {
-    let noise = estimate(residual, runs, out, false);
+    let noise = estimate(residual, runs, out, false, 0.0);
     let count = runs.iter().flat_map(|run| run.iter()).filter(|row| !out[**row]).count();
-    let rho = neighbours(residual, runs, out);
+    let rho = neighbours(residual, runs, out, 0.0);
     let is_chance = count < POSITIONS || rho * (count as f64).sqrt() < REMEMBERED;
     Noise { rho: if is_chance { 0.0 } else { rho.min(MOST_RHO) }, ..noise }
 }
@@ -262,75 +287,9 @@ pub(super) fn repeated(
         squares += group.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
         differences += group.len() - 1;
     }
-    (differences >= REPEATS)
-        .then(|| Noise { sigma: (squares / differences as f64).sqrt().max(FINEST), rho: 0.0 })
-}
-
-impl Whitener {
-    /// For rows of given noise, one per run.
-    pub fn new(rows: usize, runs: &[Vec<usize>], noise: &[Noise], out: Vec<bool>) -> Self {
-        let mut whitener =
-            Whitener { previous: vec![NONE; rows], rho: vec![0.0; rows], scale: vec![0.0; rows], out };
-        for (run, noise) in runs.iter().zip(noise) {
-            let mut last = NONE;
-            for row in run {
-                if whitener.out[*row] {
-                    last = NONE;
-                    continue;
-                }
-                let remembered = last != NONE && noise.rho > 0.0;
-                whitener.scale[*row] = noise.sigma.recip();
-                if remembered {
-                    whitener.previous[*row] = last;
-                    whitener.rho[*row] = noise.rho;
-                    whitener.scale[*row] /= (1.0 - noise.rho * noise.rho).sqrt();
-                }
-                last = *row as u32;
-            }
-        }
-        whitener
-    }
-
-    /// A column of rows, whitened, (61); rows that are left out become 0.
-    pub fn apply(&self, column: &[f64], to: &mut [f64]) {
-        for (row, x) in to.iter_mut().enumerate() {
-            let before = self.previous[row];
-            let remembered = if before == NONE { 0.0 } else { self.rho[row] * column[before as usize] };
-            *x = self.scale[row] * (column[row] - remembered);
-        }
-    }
-
-    /// The transposed of [`Whitener::apply`]: what `aᵀ apply(b)` makes of `a` is `transposed(a)ᵀ b`.
-    pub fn transposed(&self, column: &[f64]) -> Vec<f64> {
-        let mut to = vec![0.0; column.len()];
-        for (row, x) in column.iter().enumerate() {
-            let x = self.scale[row] * x;
-            to[row] += x;
-            let before = self.previous[row];
-            if before != NONE {
-                to[before as usize] -= self.rho[row] * x;
-            }
-        }
-        to
-    }
-
-    /// A column over the noise of fast changes alone, memory left aside.
-    pub fn plain(&self, column: &[f64], to: &mut [f64]) {
-        to.iter_mut().zip(column).zip(&self.scale).for_each(|((to, x), scale)| *to = scale * x);
-    }
-
-    /// The row that the noise of this one remembers, and how much of it.
-    pub fn memory(&self, row: usize) -> Option<(usize, f64)> {
-        (self.previous[row] != NONE).then(|| (self.previous[row] as usize, self.rho[row]))
-    }
-
-    /// Whether the noise of many rows remembers the one before.
-    pub fn remembers(&self) -> bool {
-        self.rho.iter().filter(|rho| **rho > FORGETFUL).count() > self.rho.len() / 10
-    }
-
-    /// How many rows count.
-    pub fn count(&self) -> usize {
-        self.scale.iter().filter(|s| **s > 0.0).count()
-    }
+    (differences >= REPEATS).then(|| Noise {
+        sigma: (squares / differences as f64).sqrt().max(FINEST),
+        rho: 0.0,
+        rounding: 0.0,
+    })
 }

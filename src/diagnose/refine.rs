@@ -4,9 +4,11 @@ use super::score::{Field, Rows, Score};
 use super::search::Rival;
 use crate::effects::{Candidate, Parameter};
 
-/// Rounds over several parameters; parabolas, or halvings of a step where nothing is smooth, for each of them.
+/// Rounds over several parameters; parabolas at most, as long as they bring so much, or halvings of a step where nothing is smooth, for
+/// each of them.
 const ROUNDS: usize = 2;
-const PARABOLAS: usize = 3;
+const PARABOLAS: usize = 12;
+const WORTHWHILE: f64 = 0.3;
 const HALVINGS: usize = 9;
 
 /// Weight of what cannot be.
@@ -50,17 +52,21 @@ fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, hea
             // Parabolas through three points; where there is no summit, the step goes on or shrinks.
             for _ in 0..if candidate.parameters[*p].smooth { PARABOLAS } else { HALVINGS } {
                 let (x, here) = (best.parameters[*p], best.at_best);
+                let smooth = candidate.parameters[*p].smooth;
                 let (Some(below), Some(above)) = (moved(x - *step, &mut best), moved(x + *step, &mut best))
                 else {
                     break;
                 };
                 let bend = below + above - 2.0 * here;
-                if candidate.parameters[*p].smooth && bend < 0.0 {
+                if smooth && bend < 0.0 {
                     let shift = (0.5 * *step * (below - above) / bend).clamp(-2.0 * *step, 2.0 * *step);
                     moved(x + shift, &mut best);
                     *step = (0.3 * *step).max(0.5 * shift.abs());
                 } else if best.parameters[*p] == x {
                     *step *= 0.5;
+                }
+                if smooth && bend < 0.0 && best.at_best - here < WORTHWHILE {
+                    break;
                 }
             }
         }

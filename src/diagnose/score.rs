@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
 use super::coarse::{Coarse, Features};
 use super::evidence::{Worth, evidence, log_mean_exp};
-use super::noise::Whitener;
 use super::space::Space;
+use super::whitener::Whitener;
 use crate::effects::{Candidate, Coefficient, Slot};
 use crate::feature::Dimension;
 use crate::identify::Linear;

@@ -109,6 +109,8 @@ const REPEATED: f64 = 0.15;
 const SHAPE: f64 = 0.35;
 /// An effect that was taken for the shape of another is at least this part of it.
 const HIDDEN: f64 = 0.8;
+/// Parameters are others beside unknown states where that brings so much, as a logarithm.
+const MOVED: f64 = 3.0;
 /// So many spaces are kept.
 const GROUNDS: usize = 12;
 /// More effects are not looked for: among settled positions many joints give way at once; what takes more names in a motion has none.
@@ -265,6 +267,33 @@ impl Search<'_> {
         measure(left.as_slice(), self.runs, &self.rows.whitener.out)
     }
 
+    /// Takes a rival in, at its best point beside what nobody knows of how it was before: a hysteresis is found with another length of
+    /// take-up where the way before the first reversal is wrong.
+    fn settle(&self, rival: &Rival, space: &Arc<Space>) -> Option<Active> {
+        let entered = self.enter(rival, space)?;
+        let candidate = &self.candidates[rival.candidate];
+        if entered.state.ncols() == 0 || candidate.parameters.iter().all(|p| p.whole) {
+            return Some(entered);
+        }
+        let beside = self.rows.field(space.with(&entered.state));
+        let score = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)?;
+        let start = Rival { candidate: rival.candidate, weight: score.evidence, score };
+        let moved = refine(self.rows, candidate, &start, &beside, self.heat);
+        if moved.score.at_best < start.score.at_best + MOVED {
+            return Some(entered);
+        }
+        let score = self.rows.score_at(
+            candidate,
+            &moved.score.parameters,
+            &self.rows.field(space.clone()),
+            self.heat,
+        )?;
+        self.enter(
+            &Rival { score: Score { evidence: rival.score.evidence, ..score }, ..rival.clone() },
+            space,
+        )
+    }
+
     /// Takes a rival in, at its best point.
     pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
         let score = rival.score.clone();
@@ -310,8 +339,7 @@ impl Search<'_> {
         self.swap(&mut active);
         let mut tried: HashSet<Vec<usize>> = HashSet::new();
         let (mut sound, mut harmful) = (active.clone(), 0);
-        let most = if self.in_motion { MOST_IN_MOTION } else { MOST };
-        while active.len() < most {
+        while active.len() < self.most() {
             // Swaps may throw out what the next step takes in again.
             if !tried.insert(active.iter().map(|effect| effect.candidate).collect()) {
                 break;
@@ -335,6 +363,11 @@ impl Search<'_> {
         sound
     }
 
+    /// How many effects are looked for at most.
+    pub fn most(&self) -> usize {
+        if self.in_motion { MOST_IN_MOTION } else { MOST }
+    }
+
     /// The effect to be taken in next.
     fn next(&self, active: &[Active]) -> Option<Active> {
         let space = self.ground(active, None);
@@ -353,7 +386,7 @@ impl Search<'_> {
             return None;
         }
         let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
-        let entered = Active { near, ..self.enter(best, &space)? };
+        let entered = Active { near, ..self.settle(best, &space)? };
         let left = self.leftover(&space.with(&entered.columns).with(&entered.state).with(&entered.shape));
         (best.weight >= ENTER * (left.heat / self.heat).max(1.0)).then_some(entered)
     }
@@ -425,7 +458,7 @@ impl Search<'_> {
                     now.filter(|now| best.candidate == own.candidate && best.score.gain <= now.gain + 0.5);
                 changed |= now.is_none();
                 let rival = now.map(|score| Rival { candidate: own.candidate, weight: best.weight, score });
-                if let Some(entered) = self.enter(rival.as_ref().unwrap_or(best), &ground) {
+                if let Some(entered) = self.settle(rival.as_ref().unwrap_or(best), &ground) {
                     active[i] = Active { near: std::mem::take(&mut active[i].near), ..entered };
                 }
                 i += 1;

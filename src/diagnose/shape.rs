@@ -38,7 +38,8 @@ pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DM
 pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
     let stretches = &rows.linear.samples;
     let mut curves: Vec<Vec<f64>> = Vec::new();
-    for j in candidate.features.iter().filter(|f| f.needs_history()).flat_map(Feature::joints) {
+    let with_history = candidate.features.iter().filter(|f| f.needs_history());
+    for (j, lasts) in with_history.flat_map(|f| f.joints().into_iter().map(|j| (j, f.remembers()))) {
         let since = column(stretches, j, |c| &c.since_reversal);
         let travelled = column(stretches, j, |c| &c.travelled);
         let range = extent(&column(stretches, j, |c| &c.position));
@@ -47,7 +48,8 @@ pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active) -> DMa
             let own = first..first + stretch.len;
             first = own.end;
             let before = |part: f64| -> Vec<f64> {
-                let unknown = |k: &usize| own.contains(k) && since[*k] >= UNKNOWN;
+                // What is taken up gradually does not end where the joint turns round.
+                let unknown = |k: &usize| own.contains(k) && (lasts || since[*k] >= UNKNOWN);
                 let decay = |k: usize| (-travelled[k] / (part * range)).exp();
                 (0..since.len()).map(|k| if unknown(&k) { decay(k) } else { 0.0 }).collect()
             };

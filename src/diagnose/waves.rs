@@ -77,17 +77,19 @@ impl Rows<'_> {
         let mut plain = vec![0.0; answer.len()];
         self.whitener.plain(answer, &mut plain);
         let step = plain.len().div_ceil(MEMORIES).max(1);
-        // (energy, what is remembered, advance of the phase) of the rows that are looked at.
+        // (energy, what is remembered, what of that is rounding, advance of the phase) of the rows that are looked at.
         let looked_at = (0..plain.len()).step_by(step).map(|row| {
             let energy = plain[row] * plain[row] * step as f64;
-            let (before, rho) = self.whitener.memory(row).unwrap_or((row, 0.0));
-            (energy, rho, x[self.linear.sample[row]] - x[self.linear.sample[before]])
+            let (before, rho, rounded) = self.whitener.memory(row).unwrap_or((row, 0.0, 0.0));
+            (energy, rho, rounded, x[self.linear.sample[row]] - x[self.linear.sample[before]])
         });
-        let (remembering, forgetful): (Vec<_>, Vec<_>) = looked_at.partition(|(_, rho, _)| *rho > 0.0);
+        let (remembering, forgetful): (Vec<_>, Vec<_>) = looked_at.partition(|(_, rho, ..)| *rho > 0.0);
         let constant: f64 = forgetful.iter().map(|(energy, ..)| energy).sum();
         let at = |factor: f64| {
-            let of = |(energy, rho, advance): &(f64, f64, f64)| {
-                energy * (1.0 + rho * rho - 2.0 * rho * (factor * advance).cos())
+            let of = |(energy, rho, rounded, advance): &(f64, f64, f64, f64)| {
+                let cos = (factor * advance).cos();
+                let passes = |part: f64| 1.0 + part * part - 2.0 * part * cos;
+                energy * passes(*rho) / passes(*rounded)
             };
             constant + remembering.iter().map(of).sum::<f64>()
         };

@@ -198,7 +198,8 @@ fn candidate(
     let bind = |expression: &Expression, own| {
         Feature::bind(expression, &binding(own)).map_err(|e| e.to_string()).and_then(|f| has_all(f, facts))
     };
-    let (spacing, stride) = own.map_or((0.0, 0.0), |j| (facts.spacing[j], facts.stride[j]));
+    let spacing = own.map_or((0.0, 0.0), |j| (facts.spacing[j], facts.finest[j]));
+    let stride = own.map_or(0.0, |j| facts.stride[j]);
     if family.widest_play().is_some_and(|width| width < stride) {
         return Err(grid::TOO_FAR.into());
     }

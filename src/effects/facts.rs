@@ -1,5 +1,6 @@
 //! What the recordings of a call have in them, as far as effects ask for it.
 
+use super::window::finest;
 use crate::error::Result;
 use crate::machine::{JointKind, Machine};
 use crate::recording::{Measurement, Recording};
@@ -15,6 +16,8 @@ pub struct RecordingFacts {
     /// Median gap between neighbouring distinct positions of every dyad's joint over all recordings, m or rad; the whole travel where
     /// they are few targets visited again and again; 0 where the joint stands still.
     pub spacing: Vec<f64>,
+    /// Shortest period of every dyad's joint, m or rad, of which a wave can be told from coarser ones.
+    pub finest: Vec<f64>,
     /// Median distance of every dyad's joint from one settled position to the next, m or rad; 0 where samples are taken in motion.
     pub stride: Vec<f64>,
     /// How many places every dyad's joint was seen at, where they are few targets visited again and again.
@@ -75,6 +78,7 @@ impl RecordingFacts {
             // Smallest steps, until all recordings are read.
             dead_bands: vec![f64::INFINITY; dyads],
             spacing: vec![0.0; dyads],
+            finest: vec![0.0; dyads],
             stride: vec![0.0; dyads],
             places: vec![None; dyads],
             time: None,
@@ -124,7 +128,12 @@ impl RecordingFacts {
         }
         for (j, positions) in seen.into_iter().enumerate() {
             facts.places[j] = facts.travel[j].and_then(|travel| places(&positions, travel));
-            facts.spacing[j] = facts.travel[j].map_or(0.0, |travel| spacing(positions, travel));
+            let Some(travel) = facts.travel[j] else { continue };
+            facts.spacing[j] = spacing(positions.clone(), travel);
+            facts.finest[j] = match facts.places[j] {
+                Some(_) => 2.0 * facts.spacing[j],
+                None => finest(&positions, facts.spacing[j]),
+            };
         }
         for ((band, travel), stride) in facts.dead_bands.iter_mut().zip(&facts.travel).zip(&facts.stride) {
             let range = travel.map_or(0.0, |(from, to)| to - from);

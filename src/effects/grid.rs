@@ -17,7 +17,7 @@ pub(super) fn range(
     form: &ParameterForm,
     own: Option<JointKind>,
     travel: Option<(f64, f64)>,
-    spacing: f64,
+    (spacing, finest): (f64, f64),
     stride: f64,
     facts: &RecordingFacts,
 ) -> Result<(f64, f64), String> {
@@ -42,19 +42,18 @@ pub(super) fn range(
             if from > to {
                 return Err(TOO_FAR.into());
             }
-            resolved(form, dimension, (from, to), spacing)
+            resolved(form, dimension, (from, to), finest)
         }
     }
 }
 
-/// Waves need two positions each: what is finer than the positions lie apart cannot be told from what is coarse.
+/// What is finer than positions tell looks like something coarse.
 fn resolved(
     form: &ParameterForm,
     dimension: Dimension,
     (from, to): (f64, f64),
-    spacing: f64,
+    wave: f64,
 ) -> Result<(f64, f64), String> {
-    let wave = 2.0 * spacing;
     let (from, to) = match form.grid {
         Grid::Periods(_) if dimension != Dimension::TIME => (from.max(wave), to),
         Grid::Orders(_) if wave > 0.0 => (from, to.min(std::f64::consts::TAU / wave)),

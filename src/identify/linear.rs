@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
 use crate::machine::Machine;
 use crate::motion::Motion;
-use crate::recording::{Chunk, Recording};
+use crate::recording::{Chunk, Recording, step_of};
 use crate::units::Quantity;
 use crate::variation::{Term, Varying};
 
@@ -35,6 +35,8 @@ pub(crate) struct Span {
     pub readings: usize,
     /// A longer time between two samples is a pause, s.
     pub pause_after: f64,
+    /// Step to which readings of lengths and of angles are rounded, m and rad; 0 where none is seen.
+    pub steps: [f64; 2],
 }
 
 /// Rows of all recordings, one per scalar reading, sample by sample.
@@ -81,6 +83,8 @@ pub(crate) struct Displaced {
 const GENEROUS: f64 = 3.0;
 /// Set-ups that nothing is known of: m and rad.
 const FREE: f64 = 10.0;
+/// About so many readings show the step that they are rounded to.
+const ENOUGH: usize = 4096;
 
 /// Calibrates with constant deviations and takes the rows there; `dead_bands` by dyad, m or rad.
 pub(crate) fn linear(
@@ -112,6 +116,14 @@ pub(crate) fn linear(
 }
 
 impl Linear {
+    /// Step to which readings of lengths, or of angles, are rounded, as its root mean square over rows, m or rad.
+    pub fn step(&self, angle: bool) -> f64 {
+        let rows = |span: &Span| (span.rows.1 - span.rows.0) as f64;
+        let all: f64 = self.spans.iter().map(rows).sum();
+        let squares = self.spans.iter().map(|span| rows(span) * span.steps[usize::from(angle)].powi(2));
+        (squares.sum::<f64>() / all.max(1.0)).sqrt()
+    }
+
     /// The same readings where geometry and effects have been displaced.
     pub fn displaced(
         &self,
@@ -250,9 +262,13 @@ fn rows(
             with_gravity: true,
         };
         let mut all: Option<Samples> = None;
+        let mut seen: Vec<Vec<f64>> = vec![Vec::new(); values];
         for item in Follow::new(machine, source.recording.chunks()?, &options) {
             let (chunk, samples) = item?;
             let mut kept = Vec::new();
+            for (i, seen) in seen.iter_mut().enumerate().filter(|(_, seen)| seen.len() < ENOUGH) {
+                seen.extend(chunk.values.iter().skip(i).step_by(values));
+            }
             for k in 0..chunk.len {
                 number += 1;
                 if !(number - 1).is_multiple_of(stride) {
@@ -318,6 +334,11 @@ fn rows(
             samples: (first_sample, linear.lines.len()),
             readings,
             pause_after: source.summary.pause_after.unwrap_or(f64::INFINITY),
+            steps: [false, true].map(|angle| {
+                let own =
+                    (0..readings).filter(|i| (source.quantity(machine, *i) == Quantity::Angle) == angle);
+                own.map(|i| seen.get(i).map_or(0.0, |seen| step_of(seen))).fold(0.0, f64::max)
+            }),
         });
     }
     Ok(linear)
