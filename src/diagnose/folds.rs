@@ -85,8 +85,11 @@ impl Normal {
         let mut white = rows.linear.constant.clone();
         rows.whiten(&mut white);
         let mut owner = vec![None; white.ncols()];
+        // Where one stands for what was the shape of another, the shape of either would do without the other.
+        let shaped = !active.iter().any(|effect| effect.hidden);
         for (i, effect) in active.iter().enumerate() {
-            for own in [&effect.columns, &effect.state, &effect.shape] {
+            let all = [&effect.columns, &effect.state, &effect.shape];
+            for own in &all[..if shaped { 3 } else { 2 }] {
                 let at = white.ncols();
                 white = white.insert_columns(at, own.ncols(), 0.0);
                 white.columns_mut(at, own.ncols()).copy_from(own);

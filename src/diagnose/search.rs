@@ -35,12 +35,19 @@ pub(super) struct Active {
     pub shape: DMatrix<f64>,
     /// Candidates that might take its place.
     pub near: Vec<usize>,
+    /// Whether it had been taken for the shape of the others, and so is judged beside their names alone.
+    pub hidden: bool,
 }
 
 impl Active {
     fn mark(&self) -> Mark {
         let parameters = self.score.parameters.iter().map(|x| x.to_bits()).collect();
         (self.candidate, self.score.coefficients, parameters)
+    }
+
+    /// In the place of another.
+    fn instead_of(self, other: &Active) -> Active {
+        Active { near: other.near.clone(), hidden: other.hidden, ..self }
     }
 }
 
@@ -69,12 +76,12 @@ pub(super) struct Search<'a> {
     pub in_motion: bool,
     /// Rivals that are known, by what has been taken in besides.
     pub known: RefCell<Known>,
-    /// The last spaces that candidates were judged beside, by what had been taken in.
-    pub grounds: RefCell<VecDeque<(Vec<Mark>, Arc<Space>)>>,
+    /// The last spaces that candidates were judged beside, by what had been taken in, and whether that was by names alone.
+    pub grounds: RefCell<VecDeque<((Vec<Mark>, bool), Arc<Space>)>>,
 }
 
-/// Rivals by the effect that stood aside and by those that were taken in.
-pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>), Rc<Vec<Rival>>>;
+/// Rivals by the effect that stood aside, by those that were taken in, and by whether these stand for their names alone.
+pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>, bool), Rc<Vec<Rival>>>;
 
 /// What tells an effect that has been taken in: candidate, coefficients and parameters.
 pub(super) type Mark = (usize, usize, Vec<u64>);
@@ -107,8 +114,9 @@ const CLOCK_SHAPE: f64 = 0.01;
 const REPEATED: f64 = 0.15;
 /// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
 const SHAPE: f64 = 0.35;
-/// An effect that was taken for the shape of another is at least this part of it.
+/// An effect that was taken for the shape of another is at least this part of it; it is looked for where shapes are this part of all.
 const HIDDEN: f64 = 0.8;
+const ODD: f64 = 0.12;
 /// Parameters are others beside unknown states where that brings so much, as a logarithm.
 const MOVED: f64 = 3.0;
 /// So many spaces are kept.
@@ -157,13 +165,14 @@ impl Search<'_> {
         let others = active.iter().enumerate().filter(|(i, _)| Some(*i) != but);
         let mut marks: Vec<Mark> = others.map(|(_, effect)| effect.mark()).collect();
         marks.sort();
-        let of = but.map(|i| active[i].candidate);
+        let (of, hidden) = (but.map(|i| active[i].candidate), but.is_some_and(|i| active[i].hidden));
         let mut known = self.known.borrow_mut();
-        if let Some(known) = known.get(&(None, marks.clone())).or_else(|| known.get(&(of, marks.clone()))) {
+        let key = |of: Option<usize>| (of, marks.clone(), hidden);
+        if let Some(known) = known.get(&key(None)).or_else(|| known.get(&key(of))) {
             return known.clone();
         }
         let rivals = Rc::new(self.compare(self.ground(active, but), among));
-        known.insert((among.and(of), marks), rivals.clone());
+        known.insert(key(among.and(of)), rivals.clone());
         rivals
     }
 
@@ -241,11 +250,13 @@ impl Search<'_> {
     /// is another effect, or unexplained.
     fn ground(&self, active: &[Active], but: Option<usize>) -> Arc<Space> {
         let others = all_but(active, but);
-        let marks: Vec<Mark> = others.iter().map(Active::mark).collect();
+        let hidden = but.is_some_and(|i| active[i].hidden);
+        let marks = (others.iter().map(Active::mark).collect(), hidden);
         if let Some((_, known)) = self.grounds.borrow().iter().find(|(of, _)| *of == marks) {
             return known.clone();
         }
-        let ground = Arc::new(match !others.is_empty() && self.shares(&others).is_misshapen(others.len()) {
+        let is_misshapen = |others: &[Active]| self.shares(others).is_misshapen(others.len());
+        let ground = Arc::new(match hidden || !others.is_empty() && is_misshapen(&others) {
             true => self.beside_names(&others),
             false => self.beside(&others, None),
         });
@@ -306,8 +317,16 @@ impl Search<'_> {
         let solution = gram.cholesky()?.solve(&columns.tr_mul(&space.apply(&self.rows.residual)));
         let none = DMatrix::zeros(columns.nrows(), 0);
         let (state, shape) = (none.clone(), none);
-        let mut effect =
-            Active { candidate: rival.candidate, score, columns, solution, state, shape, near: Vec::new() };
+        let mut effect = Active {
+            candidate: rival.candidate,
+            score,
+            columns,
+            solution,
+            state,
+            shape,
+            near: Vec::new(),
+            hidden: false,
+        };
         if self.in_motion {
             effect.state = shape::states(self.rows, candidate, &effect);
         }
@@ -332,9 +351,7 @@ impl Search<'_> {
                 continue;
             };
             let rival = Rival { candidate: effect.candidate, weight: score.evidence, score };
-            active.extend(
-                self.enter(&rival, &space).map(|again| Active { near: effect.near.clone(), ..again }),
-            );
+            active.extend(self.enter(&rival, &space).map(|again| again.instead_of(effect)));
         }
         self.swap(&mut active);
         let mut tried: HashSet<Vec<usize>> = HashSet::new();
@@ -368,25 +385,52 @@ impl Search<'_> {
         if self.in_motion { MOST_IN_MOTION } else { MOST }
     }
 
-    /// The effect to be taken in next.
+    /// The effect to be taken in next: what stands out beside those found, else what was taken for their shape.
     fn next(&self, active: &[Active]) -> Option<Active> {
-        let space = self.ground(active, None);
-        let rivals = self.rivals(active);
-        let before = self.leftover(&space);
-        let is_chance = |r: &Rival| r.weight <= ENTER * if self.is_tone(r) { before.band } else { 1.0 };
-        let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
-        let best = worthy.find(|r| !is_chance(r) && !self.repeats(r, active))?;
         let shares = self.shares(active);
-        let least = match shares.is_misshapen(active.len()) {
-            true => HIDDEN * shares.shapes,
-            false if self.in_motion => WORTH * before.energy,
-            false => WORTH_SETTLED * before.energy,
-        };
+        if shares.is_misshapen(active.len()) {
+            return self.hidden(active, &self.rivals(active), &shares);
+        }
+        self.beyond(active).or_else(|| {
+            let is_odd = shares.shapes > ODD * shares.total();
+            let ground = || Arc::new(self.beside_names(active));
+            is_odd.then(|| self.hidden(active, &self.compare(ground(), None), &shares)).flatten()
+        })
+    }
+
+    /// The effect that stands out beside those found and their shapes.
+    fn beyond(&self, active: &[Active]) -> Option<Active> {
+        let (rivals, space) = (self.rivals(active), self.ground(active, None));
+        let before = self.leftover(&space);
+        let best = self.best(&rivals, active, &before)?;
+        let least = if self.in_motion { WORTH } else { WORTH_SETTLED } * before.energy;
         if best.score.gain < self.shape_error(best, active) || 2.0 * best.score.gain < least {
             return None;
         }
+        self.entered(best, &rivals, &space)
+    }
+
+    /// The effect that takes most of what was taken for the shape of those found; `rivals`: beside their names alone.
+    fn hidden(&self, active: &[Active], rivals: &[Rival], shares: &Shares) -> Option<Active> {
+        let space = Arc::new(self.beside_names(active));
+        let best = self.best(rivals, active, &self.leftover(&space))?;
+        let is_most = 2.0 * best.score.gain >= HIDDEN * shares.shapes;
+        let is_own = best.score.gain < self.shape_error(best, active);
+        let entered = (is_most && !is_own).then(|| self.entered(best, rivals, &space)).flatten();
+        entered.map(|effect| Active { hidden: true, ..effect })
+    }
+
+    /// The best rival that is neither chance nor what was found already.
+    fn best<'r>(&self, rivals: &'r [Rival], active: &[Active], before: &Leftover) -> Option<&'r Rival> {
+        let is_chance = |r: &Rival| r.weight <= ENTER * if self.is_tone(r) { before.band } else { 1.0 };
+        let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
+        worthy.find(|r| !is_chance(r) && !self.repeats(r, active))
+    }
+
+    /// A rival taken in, if its evidence stands out from the structure that it leaves.
+    fn entered(&self, best: &Rival, rivals: &[Rival], space: &Arc<Space>) -> Option<Active> {
         let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
-        let entered = Active { near, ..self.settle(best, &space)? };
+        let entered = Active { near, ..self.settle(best, space)? };
         let left = self.leftover(&space.with(&entered.columns).with(&entered.state).with(&entered.shape));
         (best.weight >= ENTER * (left.heat / self.heat).max(1.0)).then_some(entered)
     }
@@ -459,7 +503,7 @@ impl Search<'_> {
                 changed |= now.is_none();
                 let rival = now.map(|score| Rival { candidate: own.candidate, weight: best.weight, score });
                 if let Some(entered) = self.settle(rival.as_ref().unwrap_or(best), &ground) {
-                    active[i] = Active { near: std::mem::take(&mut active[i].near), ..entered };
+                    active[i] = entered.instead_of(&active[i]);
                 }
                 i += 1;
             }
