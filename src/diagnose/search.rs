@@ -77,8 +77,11 @@ pub(super) struct Search<'a> {
     /// Rivals that are known, by what has been taken in besides.
     pub known: RefCell<Known>,
     /// The last spaces that candidates were judged beside, by what had been taken in, and whether that was by names alone.
-    pub grounds: RefCell<VecDeque<((Vec<Mark>, bool), Arc<Space>)>>,
+    pub grounds: RefCell<VecDeque<(Ground, Arc<Space>)>>,
 }
+
+/// What had been taken in, and whether it stands for its names alone.
+pub(super) type Ground = (Vec<Mark>, bool);
 
 /// Rivals by the effect that stood aside, by those that were taken in, and by whether these stand for their names alone.
 pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>, bool), Rc<Vec<Rival>>>;
