@@ -20,6 +20,7 @@ mod refine;
 mod score;
 mod search;
 mod shape;
+mod shares;
 mod space;
 mod spectrum;
 mod speeds;

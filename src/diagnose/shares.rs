@@ -1,0 +1,85 @@
+//! What belongs to the shape of the effects that were found, and what is an effect of its own.
+
+use super::leftover::Leftover;
+use super::search::{Active, Rival, Search};
+use super::shape;
+use super::space::Space;
+use crate::feature::Feature;
+
+/// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
+const OWN_SHAPE: f64 = 0.004;
+const OTHER_SHAPE: f64 = 0.002;
+/// A tone is heard in the edges of every other shape, and one course over time in another.
+const CLOCK_SHAPE: f64 = 0.01;
+/// A second line of the same family at the same place takes away at least this part of what the first does.
+const REPEATED: f64 = 0.15;
+/// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
+const SHAPE: f64 = 0.35;
+
+/// Where the energy goes that constant geometry leaves over, in units of the noise's variance.
+pub(super) struct Shares {
+    /// With the effects as their families say.
+    pub names: f64,
+    /// With the freedom of their shapes.
+    pub shapes: f64,
+    /// With nothing.
+    pub left: Leftover,
+}
+
+impl Shares {
+    /// All of it that stands out from noise.
+    pub fn total(&self) -> f64 {
+        (self.names + self.shapes + self.left.energy).max(1e-300)
+    }
+
+    /// Whether the shapes depart so far from the families' that the names are wrong.
+    pub fn is_misshapen(&self, effects: usize) -> bool {
+        let several = effects.max(2) - 1;
+        self.shapes > SHAPE * self.total() / (several as f64).sqrt()
+    }
+}
+
+impl Search<'_> {
+    /// What becomes of the energy that geometry leaves over, what chance would take not counted.
+    pub fn shares(&self, active: &[Active]) -> Shares {
+        let (names, full) = (self.beside_names(active), self.beside(active, None));
+        let energy = |space: &Space| self.rows.residual.dot(&space.apply(&self.rows.residual));
+        let taken = |from: &Space, to: &Space| {
+            (energy(from) - energy(to) - (to.parameters() - from.parameters())).max(0.0)
+        };
+        Shares { names: taken(&self.base, &names), shapes: taken(&names, &full), left: self.leftover(&full) }
+    }
+
+    /// Whether it is a wave in time: noise whose colour is not quite known has many.
+    pub fn is_tone(&self, rival: &Rival) -> bool {
+        self.candidates[rival.candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
+    }
+
+    /// Whether it is little beside what was found already at its place and has its name, or is another shape along the travel where
+    /// a curve was found: that is its shape.
+    pub fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
+        let of = |candidate: usize| (&self.candidates[candidate].effect, self.candidates[candidate].place);
+        let alike = |a: &Active| {
+            of(a.candidate) == of(rival.candidate)
+                || shape::is_of_curve(&self.candidates[a.candidate], &self.candidates[rival.candidate])
+        };
+        active.iter().any(|a| rival.score.gain < REPEATED * a.score.gain && alike(a))
+    }
+
+    /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place and where
+    /// both go by the clock.
+    pub fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
+        let place = |candidate: usize| self.candidates[candidate].place.dyad();
+        let timed = |candidate: usize| self.candidates[candidate].features.iter().any(Feature::needs_moment);
+        let share = |effect: &Active| {
+            if place(effect.candidate) == place(rival.candidate) {
+                OWN_SHAPE
+            } else if self.is_tone(rival) || timed(effect.candidate) && timed(rival.candidate) {
+                CLOCK_SHAPE
+            } else {
+                OTHER_SHAPE
+            }
+        };
+        active.iter().map(|effect| share(effect) * effect.score.gain).sum()
+    }
+}
