@@ -130,9 +130,9 @@ pub fn diagnose(
                 continue;
             }
         }
-        if !forgot && noise.iter().any(Noise::is_long) {
+        if active.is_empty() && !forgot && noise.iter().any(Noise::is_long) {
             // So long a memory may be a misfit that was taken for noise.
-            let left = search.leftover(&search.beside(&active, None));
+            let left = search.leftover(&search.base);
             if left.beyond > BEYOND_NOISE {
                 (noise, forgot) = (noise.iter().map(Noise::shortened).collect(), true);
                 continue;
