@@ -16,6 +16,7 @@ mod model;
 mod noise;
 mod not_tried;
 mod outliers;
+mod reach;
 mod refine;
 mod score;
 mod search;

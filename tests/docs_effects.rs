@@ -47,7 +47,10 @@ fn table(library: &Library) -> String {
         });
         let symbol = family.symbol.as_deref().unwrap_or("");
         let cells = [
-            format!("`{}`", family.name),
+            match &family.form_of {
+                Some(whole) => format!("`{}`, a form of `{whole}`", family.name),
+                None => format!("`{}`", family.name),
+            },
             symbol.into(),
             sits,
             directions,

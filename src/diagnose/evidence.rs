@@ -66,6 +66,26 @@ pub(super) fn evidence(gram: &DMatrix<f64>, g: &DVector<f64>, length: usize, hea
     worth
 }
 
+/// Parts of the size that are asked for how large coefficients are, each half of the one before; what is told leaves this much room.
+const PARTS: usize = 8;
+const ROOM: f64 = 2.0;
+
+/// Which part of the size that several coefficients may have is likely, as all of them together show it: what the readings hardly see
+/// of an effect is then no larger than what they see. `gram`, `g`: of columns times that size.
+pub(super) fn likely_part(gram: &DMatrix<f64>, g: &DVector<f64>, heat: f64) -> f64 {
+    let log = |part: f64| {
+        let s2 = part * part / heat;
+        let mut inner = gram * s2;
+        (0..g.len()).for_each(|i| inner[(i, i)] += 1.0);
+        let Some(cholesky) = Cholesky::new(inner) else { return f64::NEG_INFINITY };
+        let determinant = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        0.5 * s2 / heat * g.dot(&cholesky.solve(g)) - determinant
+    };
+    let parts = (0..PARTS).map(|k| 0.5f64.powi(k as i32));
+    let best = parts.max_by(|a, b| log(*a).total_cmp(&log(*b))).unwrap_or(1.0);
+    (ROOM * best).min(1.0)
+}
+
 /// `ln` of the mean of exponentials.
 pub(super) fn log_mean_exp(logs: &[f64]) -> f64 {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -119,8 +119,11 @@ pub struct HeldOutPair {
 /// One effect.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
-    /// Name of its family.
+    /// Its name.
     pub effect: String,
+    /// Name of its family, where that is a form of what `effect` names.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<String>,
     /// Joint, frame or `measurement`.
     pub at: String,
     /// A sentence for a machinist.
@@ -143,6 +146,13 @@ pub struct Finding {
     pub confusable_with: Vec<Confusable>,
     /// Part of the mean square that geometry leaves over that goes with it, 0 to 1, the others taken in.
     pub share: f64,
+}
+
+impl Finding {
+    /// Its name, with its form where it has one: `backlash (worn_stretch)`.
+    pub fn name(&self) -> String {
+        self.form.as_ref().map_or_else(|| self.effect.clone(), |form| format!("{} ({form})", self.effect))
+    }
 }
 
 /// A number of a finding.
@@ -176,6 +186,8 @@ const TOLERATED: f64 = 0.2;
 /// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
 /// leaves fewer independent readings.
 const SURPRISE: f64 = 0.003;
+/// More events of one moment each in one session are no slips: something is loose, or the instrument jumps to and fro.
+const EVENTS: usize = 2;
 /// Structure counts beyond this many standard deviations of chance.
 const CHANCE: f64 = 5.0;
 /// Names of which the data say less than this against the best are listed with it.
@@ -223,6 +235,7 @@ pub(super) fn report(
     let memory = noise.iter().map(Noise::memory).fold(1.0, f64::max);
     let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
         || left.beyond > CHANCE && search.in_motion && active.len() >= search.most()
+        || active.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
         || shares.is_misshapen(active.len())
         || shares.shapes > ODD_SHAPE * total
             && surprise > CHANCE * left.heat.max(1.0) * deviation
@@ -254,7 +267,9 @@ pub(super) fn report(
         let rivals = if in_shape { rivals } else { levelled(search, &own, rivals) };
         let odds = odds(search, &rivals, &own, left.heat.max(search.heat), is_plain);
         let own_odds = odds.iter().find(|(r, ..)| r.candidate == own.candidate).map_or(0.0, |(_, p, _)| *p);
-        let alike = odds.iter().map(|(_, p, _)| *p).filter(|p| *p >= ALIAS * own_odds);
+        let is_alike =
+            |r: &Rival, p: f64| p >= ALIAS * own_odds || search.is_form(r.candidate, own.candidate);
+        let alike = odds.iter().filter(|(r, p, _)| is_alike(r, *p)).map(|(_, p, _)| *p);
         let probability = alike.sum::<f64>().min(1.0) * trust(shares.shapes / total, 2.0 * own.weight);
         let candidate = &search.candidates[effect.candidate];
         let family = &library.families()[candidate.family];
@@ -283,13 +298,17 @@ pub(super) fn report(
                 .map(|u| effect.score.room * u)
                 .collect(),
         });
-        let confusable_with = odds
-            .iter()
-            .filter(|(.., listed)| *listed)
-            .map(|(r, p, _)| confusable(r, *p, search, machine, family))
-            .collect();
+        let mut confusable_with: Vec<Confusable> = Vec::new();
+        for (rival, probability, _) in odds.iter().filter(|(.., listed)| *listed) {
+            let other = confusable(rival, *probability, search, machine, family);
+            match confusable_with.iter_mut().find(|o| (&o.effect, &o.at) == (&other.effect, &other.at)) {
+                Some(known) => known.probability += other.probability,
+                None => confusable_with.push(other),
+            }
+        }
         findings.push(Finding {
-            effect: candidate.effect.clone(),
+            effect: candidate.told_as.clone(),
+            form: (candidate.told_as != candidate.effect).then(|| candidate.effect.clone()),
             at: candidate.place.name(machine),
             explanation,
             coefficients: sizes
@@ -401,13 +420,13 @@ fn odds<'a>(
 ) -> Vec<(&'a Rival, f64, bool)> {
     let unsure = if is_plain { 0.0 } else { UNSURE };
     let place = |r: &Rival| search.candidates[r.candidate].place;
-    let effect = |r: &Rival| &search.candidates[r.candidate].effect;
+    let effect = |r: &Rival| &search.candidates[r.candidate].told_as;
     let plain = |r: &Rival| (r.weight - own.weight).exp();
     let visible = VISIBLE * search.rows.whitener.count() as f64;
     let shift = 1.0 + (SHIFT * own.score.gain).min(visible) / heat;
     // Another name at its place, or the same at another place.
     let is_alike = |r: &Rival| place(r) == place(own) || effect(r) == effect(own);
-    let is_same = |r: &Rival| place(r) == place(own) && effect(r) == effect(own);
+    let is_same = |r: &Rival| search.is_form(r.candidate, own.candidate);
     let shifted = |r: &Rival| {
         if is_alike(r) { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
     };
@@ -434,7 +453,7 @@ fn confusable(
     let told = family.look_alikes.iter().find(|l| l.effect == candidate.effect);
     let at = candidate.place.name(machine);
     Confusable {
-        effect: candidate.effect.clone(),
+        effect: candidate.told_as.clone(),
         separate_by: told.map_or_else(
             || match candidate.place {
                 Place::Joint(_) | Place::Pair(..) => {

@@ -21,7 +21,7 @@ pub(super) fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &
         let here = rows.score_at(candidate, parameters, field, heat)?;
         let lower = rival.score.at_best - here.at_best;
         let score = Score { evidence: rival.score.evidence - lower, ..here };
-        let start = Rival { candidate: rival.candidate, weight: rival.weight - lower, score };
+        let start = Rival { weight: rival.weight - lower, score, ..rival.clone() };
         Some(refined(rows, candidate, &start, field, heat))
     });
     others.fold(best, |best, other| if other.weight > best.weight { other } else { best })
@@ -80,7 +80,8 @@ fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, hea
     }
     let grown = best.at_best - start;
     best.evidence += grown;
-    Rival { candidate: rival.candidate, weight: rival.weight + grown, score: best }
+    let reach = rival.reach + best.gain - rival.score.gain;
+    Rival { candidate: rival.candidate, weight: rival.weight + grown, score: best, reach }
 }
 
 /// Distance to the next point of the grid with the same other parameters, or with any.

@@ -9,11 +9,11 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contained::prefer_simpler;
-use super::evidence::log_mean_exp;
+use super::evidence::likely_part;
 use super::folds;
 use super::leftover::{Leftover, measure};
 use super::refine::refine;
-use super::score::{Field, Rows, Score};
+use super::score::{Rows, Score};
 use super::shape;
 use super::shares::Shares;
 use super::space::Space;
@@ -58,6 +58,14 @@ pub(super) struct Rival {
     /// Logarithm of evidence and prior together.
     pub weight: f64,
     pub score: Score,
+    /// Half the misfit energy that it takes away with what nobody knows of how it was before.
+    pub reach: f64,
+}
+
+impl Rival {
+    pub fn new(candidate: usize, weight: f64, score: Score) -> Self {
+        Rival { candidate, weight, reach: score.gain, score }
+    }
 }
 
 pub(super) struct Search<'a> {
@@ -95,7 +103,7 @@ const NEAR: usize = 40;
 const CLOSE: f64 = 0.6;
 const REFINED: usize = 8;
 /// Effects of more energy (half of it) than this show their shape; of rivals with this part of the best one's, so many are looked at.
-const LARGE: f64 = 300.0;
+pub(super) const LARGE: f64 = 300.0;
 const SIMILAR: f64 = 0.8;
 const SHAPED: usize = 8;
 /// What comes within this part of the best one's energy is a matter of shape, and the more common name is to be preferred.
@@ -103,7 +111,7 @@ const UNKNOWN_SHAPE: f64 = 0.002;
 /// But not where it leaves so much more than the noise, as part of it, that anybody would see.
 pub(super) const VISIBLE: f64 = 0.02;
 /// Fewer rows show no shape and foretell nothing.
-const MANY: usize = 500;
+pub(super) const MANY: usize = 500;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// The same among settled positions, where many joints give way a little each.
@@ -155,25 +163,27 @@ impl Search<'_> {
         let mut rivals: Vec<Rival> = (all.into_par_iter())
             .filter_map(|i| {
                 let score = rows.screen(i, &candidates[i], &field, heat)?;
-                Some(Rival { candidate: i, weight: score.evidence + priors[i], score })
+                Some(Rival::new(i, score.evidence + priors[i], score))
             })
             .collect();
         let better_first = |a: &Rival, b: &Rival| b.weight.total_cmp(&a.weight);
         rivals.sort_by(better_first);
+        self.bring_up(&mut rivals, &field);
         // Between the points of its grid a candidate may be much better: those that come into question are refined.
-        let near = rivals.first().map_or(0.0, |best| best.weight * CLOSE);
-        let close = rivals.iter().take_while(|r| r.weight >= near && r.weight > 0.0).count().min(REFINED);
+        let near = rivals.iter().map(|r| r.weight).fold(0.0, f64::max) * CLOSE;
+        let is_close = |r: &Rival| r.weight > 0.0 && (r.weight >= near || r.reach > r.score.gain);
+        let close = rivals.iter().take_while(|r| is_close(r)).count().min(REFINED);
         let refined: Vec<Rival> = rivals[..close]
             .par_iter()
             .map(|r| refine(rows, &candidates[r.candidate], r, &field, heat))
             .collect();
         rivals.splice(..close, refined);
-        rivals.sort_by(better_first);
+        rivals[..close].sort_by(better_first);
         // No play is quite a step: what explains nearly as much may do so better once its shape may depart a little from the family's.
-        let most = rivals.first().map_or(0.0, |best| best.score.gain / heat);
+        let most = rivals[..close].iter().map(|r| r.reach / heat).fold(0.0, f64::max);
         if most > LARGE && rows.whitener.count() > MANY {
             let alike: Vec<usize> =
-                (0..close).filter(|i| rivals[*i].score.gain / heat > SIMILAR * most).take(SHAPED).collect();
+                (0..close).filter(|i| rivals[*i].reach / heat > SIMILAR * most).take(SHAPED).collect();
             for i in alike {
                 rivals[i].weight = self.with_shape(&rivals[i], &field);
             }
@@ -186,21 +196,6 @@ impl Search<'_> {
         prefer_simpler(self, &mut rivals, close, &field.space);
         rivals.sort_by(better_first);
         rivals
-    }
-
-    /// The weight of a rival of which as likely as not the shape departs from the family's, (66).
-    fn with_shape(&self, rival: &Rival, field: &Field) -> f64 {
-        let Some(effect) = self.enter(rival, &field.space) else { return rival.weight };
-        let with_state = self.rows.field(field.space.with(&effect.state));
-        let shaped = self.rows.field(with_state.space.with(&effect.shape));
-        let candidate = &self.candidates[rival.candidate];
-        let Some(score) = self.rows.score_at(candidate, &rival.score.parameters, &shaped, self.heat) else {
-            return rival.weight;
-        };
-        let by_shape = field.space.worth(&effect.state, &field.left, self.heat)
-            + with_state.space.worth(&effect.shape, &with_state.left, self.heat);
-        let weight = rival.weight + by_shape + score.at_best - rival.score.at_best;
-        log_mean_exp(&[rival.weight, weight])
     }
 
     /// A rival where chance is larger than what it was searched with.
@@ -259,7 +254,7 @@ impl Search<'_> {
         }
         let beside = self.rows.field(space.with(&entered.state));
         let score = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)?;
-        let start = Rival { candidate: rival.candidate, weight: score.evidence, score };
+        let start = Rival::new(rival.candidate, score.evidence, score);
         let moved = refine(self.rows, candidate, &start, &beside, self.heat);
         if moved.score.at_best < start.score.at_best + MOVED {
             return Some(entered);
@@ -278,14 +273,22 @@ impl Search<'_> {
 
     /// Takes a rival in, at its best point.
     pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
-        let score = rival.score.clone();
+        let mut score = rival.score.clone();
         let candidate = &self.candidates[rival.candidate];
         let columns = self.rows.of(candidate, &score.parameters)?;
-        let columns = columns.columns(0, score.coefficients) * score.room;
+        let mut columns = columns.columns(0, score.coefficients) * score.room;
         let along = space.along(&columns.as_view());
-        let gram = columns.tr_mul(&columns) - along.tr_mul(&along)
-            + DMatrix::identity(score.coefficients, score.coefficients);
-        let solution = gram.cholesky()?.solve(&columns.tr_mul(&space.apply(&self.rows.residual)));
+        let mut gram = columns.tr_mul(&columns) - along.tr_mul(&along);
+        let mut toward = columns.tr_mul(&space.apply(&self.rows.residual));
+        if score.coefficients > 1 {
+            let part = likely_part(&gram, &toward, self.heat);
+            score.room *= part;
+            columns *= part;
+            gram *= part * part;
+            toward *= part;
+        }
+        (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
+        let solution = gram.cholesky()?.solve(&toward);
         let none = DMatrix::zeros(columns.nrows(), 0);
         let (state, shape) = (none.clone(), none);
         let mut effect = Active {
@@ -321,7 +324,7 @@ impl Search<'_> {
             else {
                 continue;
             };
-            let rival = Rival { candidate: effect.candidate, weight: score.evidence, score };
+            let rival = Rival::new(effect.candidate, score.evidence, score);
             active.extend(self.enter(&rival, &space).map(|again| again.instead_of(effect)));
         }
         self.swap(&mut active);
@@ -429,7 +432,7 @@ impl Search<'_> {
                 let now =
                     now.filter(|now| best.candidate == own.candidate && best.score.gain <= now.gain + 0.5);
                 changed |= now.is_none();
-                let rival = now.map(|score| Rival { candidate: own.candidate, weight: best.weight, score });
+                let rival = now.map(|score| Rival::new(own.candidate, best.weight, score));
                 if let Some(entered) = self.settle(rival.as_ref().unwrap_or(best), &ground) {
                     active[i] = entered.instead_of(&active[i]);
                 }

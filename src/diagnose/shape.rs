@@ -60,6 +60,22 @@ pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active) -> DMa
             }
         }
     }
+    // Machines that stand before a recording may have turned round just there.
+    let turned: Vec<Samples> = stretches.iter().map(Samples::turned_before).collect();
+    for feature in candidate.features.iter().filter(|f| f.needs_history()) {
+        let parameters = &active.score.parameters;
+        let (with, without) = (feature.over(&turned, parameters), feature.over(stretches, parameters));
+        let change: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
+        let mut first = 0;
+        for stretch in stretches {
+            let own = first..first + stretch.len;
+            first = own.end;
+            if change[own.clone()].iter().any(|x| x.abs() > 0.0) {
+                let only = |k: usize| if own.contains(&k) { change[k] } else { 0.0 };
+                curves.push((0..change.len()).map(only).collect());
+            }
+        }
+    }
     whitened(rows, &answers(rows, candidate, active), &curves, amplitude(active))
 }
 

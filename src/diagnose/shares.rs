@@ -55,6 +55,20 @@ impl Search<'_> {
         self.candidates[rival.candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
     }
 
+    /// Whether it happens at one moment of the recordings, or from one sample on.
+    pub fn is_event(&self, candidate: usize) -> bool {
+        let candidate = &self.candidates[candidate];
+        let jumps = |p: usize| !candidate.parameters[p].smooth && !candidate.parameters[p].whole;
+        let dated = Feature::needs_moment;
+        candidate.features.iter().any(dated) && (0..candidate.parameters.len()).any(jumps)
+    }
+
+    /// Whether two candidates are forms of one effect at one place.
+    pub fn is_form(&self, a: usize, b: usize) -> bool {
+        let (a, b) = (&self.candidates[a], &self.candidates[b]);
+        a.told_as == b.told_as && a.place == b.place
+    }
+
     /// Whether it is little beside what was found already at its place and has its name, or is another shape along the travel where
     /// a curve was found: that is its shape.
     pub fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {

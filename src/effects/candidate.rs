@@ -72,6 +72,8 @@ pub struct Candidate {
     pub family: usize,
     /// Name of the effect.
     pub effect: String,
+    /// The name that findings bear: another one where the family is a form of that, [`Family::told_as`].
+    pub told_as: String,
     /// Where it sits.
     pub place: Place,
     /// Distinct features; all have the parameters of `parameters`, in that order.
@@ -311,6 +313,7 @@ fn candidate(
     Ok(Candidate {
         family: index,
         effect: family.name.clone(),
+        told_as: family.told_as().into(),
         place,
         scatter: family.scatter.as_ref().map(|e| bind(e, own)).transpose()?,
         features,

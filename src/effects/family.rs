@@ -12,6 +12,10 @@ use crate::units::Unit;
 pub struct Family {
     /// Name, as in findings.
     pub name: String,
+    /// The name that findings bear in its place, where it is a form of something with a name of its own: play that differs along the
+    /// travel is a form of `backlash`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub form_of: Option<String>,
     /// Symbol of a standard, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub symbol: Option<String>,
@@ -74,6 +78,11 @@ pub struct Family {
 }
 
 impl Family {
+    /// The name that findings bear.
+    pub fn told_as(&self) -> &str {
+        self.form_of.as_ref().unwrap_or(&self.name)
+    }
+
     /// The widest play of which the width is stated, m or rad.
     pub(super) fn widest_play(&self) -> Option<f64> {
         let mut widest: Option<f64> = None;

@@ -118,6 +118,11 @@ impl Library {
         let kept = self.families.len();
         self.families.extend(form.families);
         for (i, family) in self.families[kept..].iter().enumerate() {
+            if let Some(whole) = family.form_of.as_ref().filter(|whole| self.family(whole).is_none()) {
+                let what = format!("\"{whole}\" is no family");
+                let mend = "name a family of this file or of the standard library";
+                return Err(at((format!("families[{i}].form_of"), fault(what, mend))));
+            }
             for (k, other) in family.look_alikes.iter().enumerate() {
                 if other.effect == family.name || self.family(&other.effect).is_none() {
                     let path = format!("families[{i}].look_alikes[{k}].effect");
@@ -132,7 +137,7 @@ impl Library {
         Ok(self)
     }
 
-    /// This library without the families of this name; what named them as look-alikes no longer does.
+    /// This library without the families of this name and the forms of it; what named them as look-alikes no longer does.
     ///
     /// # Errors
     /// [`Error::Undetermined`] if there is none.
@@ -143,9 +148,10 @@ impl Library {
                 mend: format!("name one of: {}", self.names().join(", ")),
             });
         }
-        self.families.retain(|family| family.name != name);
+        self.families.retain(|family| family.name != name && family.told_as() != name);
+        let kept: Vec<String> = self.families.iter().map(|family| family.name.clone()).collect();
         for family in &mut self.families {
-            family.look_alikes.retain(|other| other.effect != name);
+            family.look_alikes.retain(|other| kept.contains(&other.effect));
         }
         Ok(self)
     }
@@ -187,6 +193,10 @@ fn check(family: &Family) -> Checked<()> {
     if !usable {
         let what = format!("\"{}\" cannot be the name of an effect", family.name);
         return Err(("name".into(), fault(what, "use lower-case letters, digits and `_`, a letter first")));
+    }
+    if family.form_of.as_ref() == Some(&family.name) {
+        let what = format!("\"{}\" is a form of itself", family.name);
+        return Err(("form_of".into(), fault(what, "leave `form_of` out, or name what it is a form of")));
     }
     if family.sits.is_empty() {
         return Err((

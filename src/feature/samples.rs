@@ -63,6 +63,17 @@ impl Samples {
         })
     }
 
+    /// These samples as if every joint had turned round just before them.
+    pub(crate) fn turned_before(&self) -> Samples {
+        let mut turned = self.clone();
+        for joint in turned.joints.iter_mut().flatten() {
+            let unseen =
+                joint.since_reversal.iter_mut().zip(&joint.travelled).filter(|(since, _)| **since >= FAR);
+            unseen.for_each(|(since, travelled)| *since = *travelled);
+        }
+        turned
+    }
+
     /// Puts the samples that follow behind these.
     pub(crate) fn append(&mut self, next: Samples) {
         self.len += next.len;

@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use super::body::Errors;
+use super::body::{Errors, Rigid};
 use super::effect::{Effect, Place, Profile, all_places};
 use super::odd;
 use super::random::Random;
@@ -288,16 +288,21 @@ impl Case {
                 }
                 Profile::Late(_) => {
                     let r = &self.world.runs[run];
-                    let exact: Vec<Vec<f64>> = all.iter().map(|r| r.parts.clone()).collect();
+                    let exact = all.to_vec();
                     for i in 0..all.len() {
                         // One-sided at the ends of a leg, where the machine stands.
                         let a = if i == 0 || r.after_pause[i] { i } else { i - 1 };
                         let b = if i + 1 == all.len() || r.after_pause[i + 1] { i } else { i + 1 };
                         let dt = r.time[b] - r.time[a];
                         for (p, part) in all[i].parts.iter_mut().enumerate() {
-                            let rate = if dt > 0.0 { (exact[b][p] - exact[a][p]) / dt } else { 0.0 };
+                            let rate =
+                                if dt > 0.0 { (exact[b].parts[p] - exact[a].parts[p]) / dt } else { 0.0 };
                             *part -= rate * c.size;
                         }
+                        let turn = |r: &Reading| Rigid { r: r.turned, p: [0.0; 3] };
+                        let step = turn(&exact[b]).then(&turn(&exact[a]).inverse()).vector();
+                        let back = step.map(|x| if dt > 0.0 { -x / dt * c.size } else { 0.0 });
+                        all[i].turned = Rigid::turn(back).then(&turn(&exact[i])).r;
                     }
                 }
                 _ => {}
@@ -326,8 +331,8 @@ impl Case {
                 *part = (*part / resolution).round() * resolution;
             }
             if self.world.instrument == Instrument::Pose {
-                let tilt = super::body::Rigid::turn([state[3], state[4], state[5]].map(|s| s * sigma_rad));
-                let turned = super::body::Rigid { r: reading.turned, p: [0.0; 3] };
+                let tilt = Rigid::turn([state[3], state[4], state[5]].map(|s| s * sigma_rad));
+                let turned = Rigid { r: reading.turned, p: [0.0; 3] };
                 reading.turned = tilt.then(&turned).r;
             }
         }

@@ -145,7 +145,9 @@ impl Score {
             }
         }
         if let Some((plain, diagnosed)) = verdict.judged {
-            self.judged_worse.add(diagnosed > 1.1 * plain);
+            let worse = diagnosed > 1.1 * plain;
+            self.judged_worse.add(worse);
+            failed |= worse;
             self.judge_ratios.push(diagnosed / plain);
         }
         if let (Some(held), true) = (verdict.held_out, answer.mode != "odd") {
@@ -228,21 +230,30 @@ fn said_of(truth: &Truth, findings: &[&Finding], unexplained: bool) -> String {
     }
 }
 
-/// A failed case in one line.
+/// A case that failed, in one line: what is concealed, what was said, how long it took, and how the unseen path fares.
 fn told(answer: &Answer, verdict: &Verdict) -> String {
     let truths: Vec<String> =
         answer.effects.iter().map(|t| format!("{} {} (snr {:.1})", t.effect, t.at, t.snr)).collect();
-    let mut said: Vec<String> =
-        verdict.findings.iter().map(|f| format!("{} {} p={:.2}", f.effect, f.at, f.probability)).collect();
+    let mut said: Vec<String> = verdict
+        .findings
+        .iter()
+        .map(|f| {
+            let others: Vec<_> = f.confusable.iter().map(|(e, a)| format!(" or {e} {a}")).collect();
+            format!("{} {}{} p={:.2}", f.effect, f.at, others.concat(), f.probability)
+        })
+        .collect();
     said.extend(verdict.unexplained.iter().map(|at| format!("unexplained {at}")));
+    let path =
+        verdict.judged.map_or(String::new(), |(plain, own)| format!(", path {:.2} of plain", own / plain));
     let list = |all: &[String]| if all.is_empty() { "nothing".to_string() } else { all.join(", ") };
     let (label, machine) = (&answer.label, &answer.machine);
     format!(
-        "{label} {machine} {} {}: {} | said {}",
+        "{label} {machine} {} {}: {} | said {} | {:.0} s{path}",
         answer.measurement,
         answer.mode,
         list(&truths),
-        list(&said)
+        list(&said),
+        verdict.seconds
     )
 }
 

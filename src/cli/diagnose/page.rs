@@ -93,7 +93,7 @@ fn table_of(findings: &[Finding]) -> Markup {
             @for (i, finding) in findings.iter().enumerate() {
                 tr {
                     td { (i + 1) }
-                    td { (finding.effect) }
+                    td { (finding.name()) }
                     td { (finding.at) }
                     td { @for size in sizes(finding) { (size) br; } }
                     td { (probability(finding.probability)) }
@@ -196,7 +196,7 @@ fn against(curve: &Curve, finding: Option<&Finding>, most: usize) -> Markup {
         None => "Residual with geometry fitted, against the place that it fits best.",
     };
     let plot = Plot {
-        title: finding.map_or("what is unexplained".into(), |f| format!("{} at {}", f.effect, f.at)),
+        title: finding.map_or("what is unexplained".into(), |f| format!("{} at {}", f.name(), f.at)),
         x_label,
         y_label: format!("residual, {symbol}"),
         layers,

@@ -140,7 +140,7 @@ fn outliers(diagnosis: &Diagnosis) -> Vec<String> {
 pub(crate) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
     let mut lines = vec![format!(
         "{} at {}, probability {}; it explains {} of what geometry left over",
-        finding.effect,
+        finding.name(),
         finding.at,
         probability(finding.probability),
         percent(finding.share)
