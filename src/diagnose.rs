@@ -5,6 +5,7 @@
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
 mod bent;
+mod blocks;
 mod coarse;
 mod contained;
 mod evidence;

@@ -8,77 +8,164 @@ use crate::effects::Candidate;
 use crate::feature::Samples;
 use crate::identify::Linear;
 
-/// Blocks of samples that stand for themselves.
+/// Long blocks of samples, and shorter ones for what changes faster.
 pub(super) struct Coarse {
+    levels: Vec<Level>,
+    /// Features of each candidate over its grid, once they have been asked for, and the level that they are for.
+    kept: Vec<OnceLock<Option<(usize, Features)>>>,
+}
+
+/// Blocks of samples that stand for themselves.
+pub(super) struct Level {
     /// Coarse row of each row.
     row: Vec<usize>,
     /// One over the root of how many rows a coarse row has.
     weight: Vec<f64>,
     /// Coarse sample of each coarse row.
     pub sample: Vec<usize>,
+    /// First coarse row of each coarse sample, and their number.
+    pub first: Vec<usize>,
     /// What features see of the samples in the middle of the blocks.
     samples: Vec<Samples>,
     /// Sample in the middle of the block, for every sample.
     middle: Vec<usize>,
-    /// Features of each candidate over its grid, once they have been asked for.
-    kept: Vec<OnceLock<Option<Features>>>,
 }
 
 /// Features of a candidate at the middles of blocks, over its grid.
 pub(super) struct Features {
-    /// Point by point, feature by feature, sample by sample.
+    /// Point by point, feature by feature, sample by sample of its runs.
     values: Vec<f32>,
+    /// Where each point's values begin, and its runs.
+    points: Vec<(usize, usize)>,
+    /// Runs of samples outside of which all features of a point vanish: first one, number.
+    runs: Vec<(usize, usize)>,
     features: usize,
     samples: usize,
 }
 
-impl Features {
-    /// Of one point, one slice a feature; `None` where a value is not finite.
-    pub fn at(&self, point: usize) -> Option<Vec<&[f32]>> {
-        let width = self.features * self.samples;
-        let all = &self.values[point * width..(point + 1) * width];
-        all.iter().all(|x| x.is_finite()).then(|| all.chunks_exact(self.samples).collect())
+/// Features of one point.
+pub(super) struct AtPoint<'a> {
+    /// Samples outside of which they vanish.
+    pub runs: &'a [(usize, usize)],
+    /// One slice a feature, run after run.
+    pub columns: Vec<&'a [f32]>,
+    /// How many samples there are in all.
+    pub samples: usize,
+}
+
+impl AtPoint<'_> {
+    /// Part of the samples where they do not vanish.
+    pub fn part(&self) -> f64 {
+        self.columns.first().map_or(0.0, |column| column.len() as f64 / self.samples.max(1) as f64)
     }
 }
 
-/// About so many coarse rows are kept, of blocks no longer than this.
+impl Features {
+    /// Of one point; `None` where a value is not finite.
+    pub fn at(&self, point: usize) -> Option<AtPoint<'_>> {
+        let (from, first) = self.points[point];
+        let last = self.points.get(point + 1).map_or(self.runs.len(), |next| next.1);
+        let runs = &self.runs[first..last];
+        let count: usize = runs.iter().map(|run| run.1).sum();
+        let all = &self.values[from..from + count * self.features];
+        let columns = (0..self.features).map(|f| &all[f * count..(f + 1) * count]).collect();
+        all.iter().all(|x| x.is_finite()).then_some(AtPoint { runs, columns, samples: self.samples })
+    }
+
+    /// Puts a point behind the others.
+    fn push(&mut self, columns: &[Vec<f64>], picked: impl Fn(usize) -> usize) {
+        self.points.push((self.values.len(), self.runs.len()));
+        let largest: Vec<f64> =
+            columns.iter().map(|c| c.iter().fold(0.0, |most, x| x.abs().max(most))).collect();
+        let acts = |k: &usize| {
+            columns.iter().zip(&largest).any(|(c, most)| !(c[picked(*k)].abs() <= VANISHES * most))
+        };
+        let first = self.runs.len();
+        let mut k = 0;
+        while let Some(from) = (k..self.samples).find(acts) {
+            k = (from..self.samples).find(|k| !acts(k)).unwrap_or(self.samples);
+            self.runs.push((from, k - from));
+        }
+        for column in columns {
+            for (from, count) in &self.runs[first..] {
+                self.values.extend((*from..from + count).map(|k| column[picked(k)] as f32));
+            }
+        }
+    }
+}
+
+/// About so many coarse rows are kept, of blocks no longer than this; on the second level of blocks shorter by this factor.
 const ROWS: usize = 1200;
 const LONGEST: usize = 8;
+const SHORTER: usize = 3;
 /// A feature whose root mean square changes by less than this part within a block counts as smooth.
 const ROUGH: f64 = 0.2;
+/// Features vanish below this part of their largest value.
+const VANISHES: f64 = 1e-6;
 /// Candidates with more numbers than this are not kept.
 const MOST_KEPT: usize = 40_000_000;
 
 impl Coarse {
     pub fn new(linear: &Linear, candidates: usize) -> Self {
         let size = (linear.residual.len() / ROWS).clamp(1, LONGEST);
-        let mut coarse = Coarse {
+        let mut sizes = vec![size];
+        if size >= 2 * SHORTER {
+            sizes.push(size / SHORTER);
+        }
+        Coarse {
+            levels: sizes.into_iter().map(|size| Level::new(linear, size)).collect(),
+            kept: (0..candidates).map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// Features of candidate `i` over its grid, if they change little within a block, with the number of the level.
+    pub fn features(&self, i: usize, candidate: &Candidate, fine: &[Samples]) -> Option<&(usize, Features)> {
+        let first = || {
+            (self.levels.iter().enumerate())
+                .find_map(|(l, level)| Some((l, level.evaluate(candidate, fine)?)))
+        };
+        self.kept[i].get_or_init(first).as_ref()
+    }
+}
+
+impl Level {
+    fn new(linear: &Linear, size: usize) -> Self {
+        let mut level = Level {
             row: Vec::new(),
             weight: Vec::new(),
             sample: Vec::new(),
+            first: Vec::new(),
             samples: Vec::new(),
             middle: Vec::new(),
-            kept: (0..candidates).map(|_| OnceLock::new()).collect(),
         };
-        let mut samples = 0;
         for (s, span) in linear.spans.iter().enumerate() {
             let count = span.samples.1 - span.samples.0;
             let blocks: Vec<(usize, usize)> =
                 (0..count).step_by(size).map(|from| (from, (from + size).min(count))).collect();
             let middles: Vec<usize> = blocks.iter().map(|(from, to)| (from + to - 1) / 2).collect();
             for ((from, to), middle) in blocks.iter().zip(&middles) {
-                let first = coarse.weight.len();
+                let first = level.weight.len();
                 for _ in *from..*to {
-                    coarse.row.extend(first..first + span.readings);
-                    coarse.middle.push(span.samples.0 + middle);
+                    level.row.extend(first..first + span.readings);
+                    level.middle.push(span.samples.0 + middle);
                 }
-                coarse.weight.extend(vec![((to - from) as f64).sqrt().recip(); span.readings]);
-                coarse.sample.extend(vec![samples; span.readings]);
-                samples += 1;
+                level.weight.extend(vec![((to - from) as f64).sqrt().recip(); span.readings]);
+                level.sample.extend(vec![level.first.len(); span.readings]);
+                level.first.push(first);
             }
-            coarse.samples.push(linear.samples[s].chosen(&middles));
+            level.samples.push(linear.samples[s].chosen(&middles));
         }
-        coarse
+        level
+    }
+
+    /// Coarse rows of coarse samples that follow each other: the first one and how many there are.
+    pub fn rows(&self, (from, count): (usize, usize)) -> (usize, usize) {
+        let end = self.first.get(from + count).copied().unwrap_or(self.weight.len());
+        (self.first[from], end - self.first[from])
     }
 
     /// Sums over blocks; white noise keeps its variance.
@@ -97,38 +184,32 @@ impl Coarse {
         out
     }
 
-    /// Features of candidate `i` over its grid, if they change little within a block.
-    pub fn features(&self, i: usize, candidate: &Candidate, fine: &[Samples]) -> Option<&Features> {
-        self.kept[i].get_or_init(|| self.evaluate(candidate, fine)).as_ref()
-    }
-
     fn evaluate(&self, candidate: &Candidate, fine: &[Samples]) -> Option<Features> {
-        let features = candidate.features.len();
-        let samples = self.sample.last().map_or(0, |last| last + 1);
+        let (features, samples) = (candidate.features.len(), self.first.len());
         if candidate.grid.len() * features * samples > MOST_KEPT || !self.is_smooth(candidate, fine) {
             return None;
         }
+        let mut kept =
+            Features { values: Vec::new(), points: Vec::new(), runs: Vec::new(), features, samples };
         // What remembers the way it came is followed over every sample.
-        let remembers = candidate.features.iter().any(|f| f.remembers());
-        let mut values = Vec::with_capacity(candidate.grid.len() * features * samples);
-        if !remembers {
-            candidate.scan(&self.samples, |_, columns| {
-                columns.iter().for_each(|column| values.extend(column.iter().map(|x| *x as f32)));
-            });
-            return Some(Features { values, features, samples });
+        if !candidate.features.iter().any(|f| f.remembers()) {
+            candidate.scan(&self.samples, |_, columns| kept.push(columns, |k| k));
+            return Some(kept);
         }
         let mut middles = self.middle.clone();
         middles.dedup();
-        candidate.scan(fine, |_, columns| {
-            columns.iter().for_each(|column| values.extend(middles.iter().map(|m| column[*m] as f32)));
-        });
-        Some(Features { values, features, samples })
+        candidate.scan(fine, |_, columns| kept.push(columns, |k| middles[k]));
+        Some(kept)
     }
 
-    /// Whether the features change little within a block, at both ends of the grid.
+    /// Whether the features change little within a block, at both ends of the grid; what jumps, in its middle.
     fn is_smooth(&self, candidate: &Candidate, fine: &[Samples]) -> bool {
-        let ends = [candidate.grid.first(), candidate.grid.last()];
-        ends.into_iter().flatten().all(|point| {
+        let grid = &candidate.grid;
+        let points = match candidate.jumps() {
+            true => [grid.get(grid.len() / 2), None],
+            false => [grid.first(), grid.last()],
+        };
+        points.into_iter().flatten().all(|point| {
             candidate.features.iter().all(|feature| {
                 let column = feature.over(fine, point);
                 let (mut off, mut all) = (0.0, 0.0);

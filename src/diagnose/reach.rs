@@ -27,16 +27,15 @@ impl Search<'_> {
         let chosen: Vec<usize> = (0..worthy).filter(|i| remembers(&rivals[*i])).take(REMEMBERED).collect();
         for i in chosen {
             let rival = &mut rivals[i];
-            let Some(effect) = self.enter(rival, &field.space).filter(|e| e.state.ncols() > 0) else {
-                continue;
-            };
-            let beside = self.rows.field(field.space.with(&effect.state));
+            let state = self.enter_bare(rival, &field.space).map(|effect| self.state_of(&effect));
+            let Some(state) = state.filter(|state| state.ncols() > 0) else { continue };
+            let beside = self.rows.field(field.space.with(&state));
             let candidate = &self.candidates[rival.candidate];
             let Some(score) = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)
             else {
                 continue;
             };
-            let worth = field.space.worth(&effect.state, &field.left, self.heat);
+            let worth = field.space.worth(&state, &field.left, self.heat);
             ranks[i] = rival.weight + (worth + score.at_best - rival.score.at_best).max(0.0);
             rival.reach = score.gain + (worth * self.heat).max(0.0);
         }

@@ -1,9 +1,9 @@
 //! How well a candidate explains what is left: its evidence against chance, over its whole grid, `docs/diagnosis.md` (63) to (64).
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 
-use nalgebra::{DMatrix, DMatrixViewMut, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::coarse::{Coarse, Features};
 use super::evidence::{Worth, evidence, log_mean_exp};
@@ -21,9 +21,9 @@ pub(super) struct Rows<'a> {
     /// Whitened residuals of the constant model.
     pub residual: DVector<f64>,
     /// Samples put together in blocks, for features that change little within one.
-    coarse: &'a Coarse,
+    pub(super) coarse: &'a Coarse,
     columns: Mutex<HashMap<Key, Arc<Vec<f64>>>>,
-    coarse_columns: Mutex<HashMap<Key, Arc<Vec<f64>>>>,
+    pub(super) coarse_columns: Mutex<HashMap<(usize, Key), Arc<Vec<f64>>>>,
 }
 
 /// What all candidates are judged against: the space, and the residuals beside it, fine and coarse.
@@ -31,11 +31,11 @@ pub(super) struct Field {
     pub space: Arc<Space>,
     /// `M r`.
     pub left: DVector<f64>,
-    coarse_space: Space,
-    coarse_left: DVector<f64>,
+    /// Space and residuals on the blocks of each level, once they have been asked for.
+    pub(super) coarse: Vec<OnceLock<(Space, DVector<f64>)>>,
 }
 
-type Key = (usize, usize, [u64; 6]);
+pub(super) type Key = (usize, usize, [u64; 6]);
 
 /// A candidate at its best.
 #[derive(Clone, Debug)]
@@ -62,23 +62,28 @@ const ROOM: f64 = 4.0;
 const ROOM_BEYOND: f64 = 2.0;
 
 /// Numbers of columns that are built at a time: they stay in a core's cache.
-const BATCH: usize = 1 << 20;
+pub(super) const BATCH: usize = 1 << 20;
 
 impl<'a> Rows<'a> {
     pub fn new(linear: &'a Linear, coarse: &'a Coarse, whitener: Whitener) -> Self {
         let mut residual = DVector::zeros(linear.residual.len());
         whitener.apply(&linear.residual, residual.as_mut_slice());
-        let empty = || Mutex::new(HashMap::new());
-        Rows { linear, whitener, residual, coarse, columns: empty(), coarse_columns: empty() }
+        Rows {
+            linear,
+            whitener,
+            residual,
+            coarse,
+            columns: Mutex::default(),
+            coarse_columns: Mutex::default(),
+        }
     }
 
     /// What candidates are judged against beside a space.
     pub fn field(&self, space: impl Into<Arc<Space>>) -> Field {
         let space = space.into();
         let left = space.apply(&self.residual);
-        let coarse_space = Space::of_factor(self.coarse.reduce_all(space.factor()));
-        let coarse_left = DVector::from_vec(self.coarse.reduce(left.as_slice()));
-        Field { space, left, coarse_space, coarse_left }
+        let coarse = self.coarse.levels().iter().map(|_| OnceLock::new()).collect();
+        Field { space, left, coarse }
     }
 
     /// Everything constant, marginalised.
@@ -209,14 +214,19 @@ impl<'a> Rows<'a> {
         let kept = self.coarse.features(i, candidate, &self.linear.samples);
         self.table(candidate, &candidate.grid, field, kept, heat, &all, &mut table);
         let rough = summary(&candidate.grid, &table, &all)?;
-        // White rows of noise that remembers are differences: what jumps is in a single one, and drowns in its block.
-        match kept.is_some() && self.whitener.remembers() {
-            true => {
-                let fine = self.score_at(candidate, &rough.parameters, field, heat)?;
-                Some(Score { evidence: rough.evidence + fine.at_best - rough.at_best, ..fine })
-            }
-            false => Some(rough),
+        if kept.is_none() || !self.whitener.remembers() {
+            return Some(rough);
         }
+        // White rows of noise that remembers are differences: what jumps is in a single one, and drowns in its block.
+        let evidence: Vec<f64> =
+            table.iter().map(|best| best.as_ref().map_or(f64::NEG_INFINITY, |best| best.evidence)).collect();
+        let looked_at: Vec<Vec<f64>> = match candidate.jumps() {
+            true => peaks(&evidence).into_iter().map(|i| candidate.grid[i].clone()).collect(),
+            false => vec![rough.parameters.clone()],
+        };
+        let fine = looked_at.iter().filter_map(|at| self.score_at(candidate, at, field, heat));
+        let fine = fine.max_by(|a, b| a.at_best.total_cmp(&b.at_best))?;
+        Some(Score { evidence: rough.evidence + fine.at_best - rough.at_best, ..fine })
     }
 
     /// Evidence at a single point, finely.
@@ -240,94 +250,74 @@ impl<'a> Rows<'a> {
         candidate: &Candidate,
         grid: &[Vec<f64>],
         field: &Field,
-        kept: Option<&Features>,
+        kept: Option<&(usize, Features)>,
         heat: f64,
         points: &[usize],
         table: &mut [Option<Best>],
     ) {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
-        let (space, left) = match kept {
-            Some(_) => (&field.coarse_space, &field.coarse_left),
-            None => (&*field.space, &field.left),
-        };
+        if let Some((level, kept)) = kept {
+            return self.coarse_table(candidate, grid, field, (*level, kept), heat, points, table);
+        }
+        let (space, left) = (&*field.space, &field.left);
         for batch in points.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
             let mut built = Vec::new();
             for i in batch {
                 let at = built.len() * k;
-                let is_built = match kept {
-                    Some(kept) => {
-                        let to = joined.columns_mut(at, k);
-                        kept.at(*i).map(|features| self.on_blocks(candidate, &features, to)).is_some()
-                    }
-                    None => self
-                        .of(candidate, &grid[*i])
-                        .map(|columns| joined.columns_mut(at, k).copy_from(&columns))
-                        .is_some(),
-                };
-                if is_built {
+                if let Some(columns) = self.of(candidate, &grid[*i]) {
+                    joined.columns_mut(at, k).copy_from(&columns);
                     built.push(*i);
                 }
             }
-            let joined = joined.columns(0, k * built.len());
-            let along = space.along(&joined);
-            let toward = joined.tr_mul(left);
-            for (b, i) in built.iter().enumerate() {
-                let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
-                let gram = match k > WIDE {
-                    true => columns.transpose() * columns - own.transpose() * own,
-                    false => columns.tr_mul(&columns) - own.tr_mul(&own),
-                };
-                let g = toward.rows(b * k, k).into_owned();
-                let lengths = if has_overtones(candidate, &grid[*i]) { &lengths[..] } else { &lengths[..1] };
-                let all: Vec<Worth> =
-                    lengths.iter().map(|length| evidence(&gram, &g, *length, heat)).collect();
-                let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
-                let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
-                let Worth { gain, size, .. } = all[best];
-                let room = if size > 1.0 { ROOM_BEYOND * size } else { ROOM };
-                table[*i] = Some(Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room });
-            }
+            judge(&joined.columns(0, k * built.len()), space, left, &built, &mut |i, gram, g| {
+                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat));
+            });
         }
     }
+}
 
-    /// Whitened columns over blocks.
-    fn on_blocks(&self, candidate: &Candidate, features: &[&[f32]], mut to: DMatrixViewMut<f64>) {
-        for (c, coefficient) in candidate.coefficients.iter().enumerate() {
-            let is_number = is_of_number(coefficient);
-            let unit = (coefficient.parts.first())
-                .map_or(0.0, |part| unit(coefficient.size, features[part.feature], is_number));
-            let mut column = to.column_mut(c);
-            let column = column.as_mut_slice();
-            for part in &coefficient.parts {
-                let answer = self.coarse_answer(part.slot, part.direction);
-                let feature = features[part.feature];
-                for ((x, answer), sample) in column.iter_mut().zip(answer.iter()).zip(&self.coarse.sample) {
-                    *x += answer * f64::from(feature[*sample]) * unit;
-                }
-            }
-        }
+/// Judges columns, as many for each of these points, beside a space: what is left of their Gram matrix, and of what leads to the residuals.
+pub(super) fn judge(
+    joined: &DMatrixView<f64>,
+    space: &Space,
+    left: &DVector<f64>,
+    points: &[usize],
+    take: &mut dyn FnMut(usize, &DMatrix<f64>, &DVector<f64>),
+) {
+    let k = joined.ncols() / points.len().max(1);
+    let (along, toward) = (space.along(joined), joined.tr_mul(left));
+    for (b, i) in points.iter().enumerate() {
+        let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
+        let gram = match k > WIDE {
+            true => columns.transpose() * columns - own.transpose() * own,
+            false => columns.tr_mul(&columns) - own.tr_mul(&own),
+        };
+        take(*i, &gram, &toward.rows(b * k, k).into_owned());
     }
+}
 
-    fn coarse_answer(&self, slot: Slot, direction: Twist<f64>) -> Arc<Vec<f64>> {
-        let key = key(slot, direction);
-        if let Some(known) = self.coarse_columns.lock().ok().and_then(|map| map.get(&key).cloned()) {
-            return known;
-        }
-        let fine = self.answer(slot, direction);
-        let mut white = vec![0.0; fine.len()];
-        self.whitener.apply(&fine, &mut white);
-        let column = Arc::new(self.coarse.reduce(&white));
-        if let Ok(mut map) = self.coarse_columns.lock() {
-            map.insert(key, column.clone());
-        }
-        column
-    }
+/// The best of a candidate at one point, over how many of its coefficients take part.
+pub(super) fn best(
+    candidate: &Candidate,
+    at: &[f64],
+    lengths: &[usize],
+    gram: &DMatrix<f64>,
+    g: &DVector<f64>,
+    heat: f64,
+) -> Best {
+    let lengths = if has_overtones(candidate, at) { lengths } else { &lengths[..1] };
+    let all: Vec<Worth> = lengths.iter().map(|length| evidence(gram, g, *length, heat)).collect();
+    let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
+    let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
+    let Worth { gain, size, .. } = all[best];
+    let room = if size > 1.0 { ROOM_BEYOND * size } else { ROOM };
+    Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room }
 }
 
 /// Candidate at one point of its grid.
 #[derive(Clone, Debug)]
-struct Best {
+pub(super) struct Best {
     evidence: f64,
     length: usize,
     gain: f64,
@@ -372,7 +362,7 @@ fn peaks(values: &[f64]) -> Vec<usize> {
     peaks
 }
 
-fn key(slot: Slot, direction: Twist<f64>) -> Key {
+pub(super) fn key(slot: Slot, direction: Twist<f64>) -> Key {
     let d = direction.to_array().map(f64::to_bits);
     match slot {
         Slot::Before(j) => (0, j, d),
@@ -384,13 +374,17 @@ fn key(slot: Slot, direction: Twist<f64>) -> Key {
 /// The usual size over the root mean square of the first part's feature.
 fn unit_size(coefficient: &Coefficient, features: &[Vec<f64>]) -> f64 {
     let is_number = is_of_number(coefficient);
-    coefficient.parts.first().map_or(0.0, |part| unit(coefficient.size, &features[part.feature], is_number))
+    coefficient.parts.first().map_or(0.0, |part| {
+        let feature = &features[part.feature];
+        unit(coefficient.size, feature, feature.len(), is_number)
+    })
 }
 
-/// 0 where the feature is next to nothing at every sample: nobody can see it there, and its coefficient could be anything.
-fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X], is_number: bool) -> f64 {
+/// 0 where the feature is next to nothing at every sample: nobody can see it there, and its coefficient could be anything. `feature`: where
+/// it does not vanish, of so many samples.
+pub(super) fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X], samples: usize, is_number: bool) -> f64 {
     let square = |x: &X| (*x).into() * (*x).into();
-    let rms = (feature.iter().map(square).sum::<f64>() / feature.len().max(1) as f64).sqrt();
+    let rms = (feature.iter().map(square).sum::<f64>() / samples.max(1) as f64).sqrt();
     if rms > if is_number { FAINT } else { ROUNDING } { size / rms } else { 0.0 }
 }
 
@@ -400,7 +394,7 @@ const FAINT: f64 = 1e-4;
 const ROUNDING: f64 = 1e-12;
 
 /// Whether what it multiplies is a number without a unit.
-fn is_of_number(coefficient: &Coefficient) -> bool {
+pub(super) fn is_of_number(coefficient: &Coefficient) -> bool {
     is_travel(coefficient.dimension)
 }
 
@@ -421,7 +415,7 @@ fn has_overtones(candidate: &Candidate, at: &[f64]) -> bool {
 }
 
 /// How many coefficients may take part: all, or those of the first features from `least` on.
-fn lengths(candidate: &Candidate) -> Vec<usize> {
+pub(super) fn lengths(candidate: &Candidate) -> Vec<usize> {
     let last = candidate.coefficients.iter().map(|c| c.order + 1).max().unwrap_or(0);
     (candidate.least.max(1)..=last.max(candidate.least.max(1)))
         .map(|orders| candidate.coefficients.iter().filter(|c| c.order < orders).count())

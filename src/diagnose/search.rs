@@ -273,6 +273,22 @@ impl Search<'_> {
 
     /// Takes a rival in, at its best point.
     pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
+        let mut effect = self.enter_bare(rival, space)?;
+        effect.state = self.state_of(&effect);
+        effect.shape = shape::columns(self.rows, &self.candidates[rival.candidate], &effect);
+        Some(effect)
+    }
+
+    /// Columns of what an effect was before anybody looked.
+    pub fn state_of(&self, effect: &Active) -> DMatrix<f64> {
+        match self.in_motion {
+            true => shape::states(self.rows, &self.candidates[effect.candidate], effect),
+            false => DMatrix::zeros(effect.columns.nrows(), 0),
+        }
+    }
+
+    /// The same without states and shape.
+    pub fn enter_bare(&self, rival: &Rival, space: &Space) -> Option<Active> {
         let mut score = rival.score.clone();
         let candidate = &self.candidates[rival.candidate];
         let columns = self.rows.of(candidate, &score.parameters)?;
@@ -291,7 +307,7 @@ impl Search<'_> {
         let solution = gram.cholesky()?.solve(&toward);
         let none = DMatrix::zeros(columns.nrows(), 0);
         let (state, shape) = (none.clone(), none);
-        let mut effect = Active {
+        Some(Active {
             candidate: rival.candidate,
             score,
             columns,
@@ -300,12 +316,7 @@ impl Search<'_> {
             shape,
             near: Vec::new(),
             hidden: false,
-        };
-        if self.in_motion {
-            effect.state = shape::states(self.rows, candidate, &effect);
-        }
-        effect.shape = shape::columns(self.rows, candidate, &effect);
-        Some(effect)
+        })
     }
 
     /// Forward with full comparison, and after each step every effect against all others in its place.

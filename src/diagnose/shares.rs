@@ -58,9 +58,7 @@ impl Search<'_> {
     /// Whether it happens at one moment of the recordings, or from one sample on.
     pub fn is_event(&self, candidate: usize) -> bool {
         let candidate = &self.candidates[candidate];
-        let jumps = |p: usize| !candidate.parameters[p].smooth && !candidate.parameters[p].whole;
-        let dated = Feature::needs_moment;
-        candidate.features.iter().any(dated) && (0..candidate.parameters.len()).any(jumps)
+        candidate.jumps() && candidate.features.iter().any(Feature::needs_moment)
     }
 
     /// Whether two candidates are forms of one effect at one place.

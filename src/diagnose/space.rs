@@ -1,6 +1,6 @@
 //! What is known already: geometry and the effects found so far, marginalised out of everything that is judged, `docs/diagnosis.md` (62).
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, SVD};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn, SVD, U1};
 
 /// The precision of whitened rows after columns with Gaussian priors have been marginalised: `M = I - W Wᵀ`.
 #[derive(Clone)]
@@ -73,6 +73,16 @@ impl Space {
         let toward = columns.tr_mul(left) / heat;
         0.5 * toward.dot(&factor.solve(&toward))
             - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+    }
+
+    /// How many columns `W` has.
+    pub fn width(&self) -> usize {
+        self.w.ncols()
+    }
+
+    /// Adds `Wᵀ x` of columns that are given for some rows from `first` on and are zero elsewhere.
+    pub fn add_along(&self, first: usize, part: &DMatrixView<f64, U1, Dyn>, to: &mut DMatrix<f64>) {
+        to.gemm(1.0, &self.wt.columns(first, part.nrows()), part, 1.0);
     }
 
     /// How many parameters it stands for, as far as the rows determine them: the trace of `I - M`.

@@ -92,6 +92,13 @@ pub struct Candidate {
     pub scatter: Option<Feature>,
 }
 
+impl Candidate {
+    /// Whether its features jump at a value of a parameter, as a slip does at its moment.
+    pub(crate) fn jumps(&self) -> bool {
+        self.parameters.iter().any(|p| !p.smooth && !p.whole)
+    }
+}
+
 /// A family that was not tried at a place, or nowhere, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Skipped {

@@ -1,0 +1,127 @@
+//! Candidates screened on blocks of samples, `coarse.rs`.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::coarse::{AtPoint, Features, Level};
+use super::score::{BATCH, Best, Field, Rows, best, is_of_number, judge, key, lengths, unit};
+use super::space::Space;
+use crate::effects::{Candidate, Slot};
+use crate::lie::Twist;
+
+/// Where features vanish on all but this part of the samples, only those are looked at.
+const SPARSE: f64 = 0.3;
+
+impl Rows<'_> {
+    /// Fills the table at these points of the grid on the blocks of a level: all rows at once where features act everywhere, else those
+    /// rows alone where they act.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn coarse_table(
+        &self,
+        candidate: &Candidate,
+        grid: &[Vec<f64>],
+        field: &Field,
+        (number, kept): (usize, &Features),
+        heat: f64,
+        points: &[usize],
+        table: &mut [Option<Best>],
+    ) {
+        let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
+        let level = &self.coarse.levels()[number];
+        let (space, left) = field.coarse[number].get_or_init(|| {
+            let space = Space::of_factor(level.reduce_all(field.space.factor()));
+            (space, DVector::from_vec(level.reduce(field.left.as_slice())))
+        });
+        let answers: Vec<Vec<Arc<Vec<f64>>>> = (candidate.coefficients.iter())
+            .map(|c| c.parts.iter().map(|p| self.coarse_answer(number, p.slot, p.direction)).collect())
+            .collect();
+        let mut everywhere = Vec::new();
+        let mut columns = DMatrix::zeros(left.len(), k);
+        for i in points {
+            let Some(features) = kept.at(*i) else { continue };
+            if features.part() > SPARSE {
+                everywhere.push(*i);
+                continue;
+            }
+            let count = on_blocks(candidate, level, &answers, &features, &mut columns);
+            let own = columns.rows(0, count);
+            let (mut along, mut g, mut from) = (DMatrix::zeros(space.width(), k), DVector::zeros(k), 0);
+            for run in features.runs {
+                let (first, rows) = level.rows(*run);
+                let part = own.rows(from, rows);
+                space.add_along(first, &part, &mut along);
+                g += part.tr_mul(&left.rows(first, rows));
+                from += rows;
+            }
+            let gram = own.tr_mul(&own) - along.tr_mul(&along);
+            table[*i] = Some(best(candidate, &grid[*i], &lengths, &gram, &g, heat));
+        }
+        for batch in everywhere.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
+            let mut joined = DMatrix::zeros(left.len(), k * batch.len());
+            for (b, i) in batch.iter().enumerate() {
+                let Some(features) = kept.at(*i) else { continue };
+                on_blocks(candidate, level, &answers, &features, &mut columns);
+                let (mut from, mut to) = (0, joined.columns_mut(b * k, k));
+                for run in features.runs {
+                    let (first, rows) = level.rows(*run);
+                    to.rows_mut(first, rows).copy_from(&columns.rows(from, rows));
+                    from += rows;
+                }
+            }
+            judge(&joined.columns(0, k * batch.len()), space, left, batch, &mut |i, gram, g| {
+                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat));
+            });
+        }
+    }
+
+    fn coarse_answer(&self, level: usize, slot: Slot, direction: Twist<f64>) -> Arc<Vec<f64>> {
+        let key = (level, key(slot, direction));
+        if let Some(known) = self.coarse_columns.lock().ok().and_then(|map| map.get(&key).cloned()) {
+            return known;
+        }
+        let fine = self.answer(slot, direction);
+        let mut white = vec![0.0; fine.len()];
+        self.whitener.apply(&fine, &mut white);
+        let column = Arc::new(self.coarse.levels()[level].reduce(&white));
+        if let Ok(mut map) = self.coarse_columns.lock() {
+            map.insert(key, column.clone());
+        }
+        column
+    }
+}
+
+/// Whitened columns of a candidate over the blocks where its features act, run after run; how many rows that are.
+fn on_blocks(
+    candidate: &Candidate,
+    level: &Level,
+    answers: &[Vec<Arc<Vec<f64>>>],
+    features: &AtPoint,
+    to: &mut DMatrix<f64>,
+) -> usize {
+    let mut count = 0;
+    for (c, coefficient) in candidate.coefficients.iter().enumerate() {
+        let is_number = is_of_number(coefficient);
+        let unit = (coefficient.parts.first()).map_or(0.0, |part| {
+            unit(coefficient.size, features.columns[part.feature], features.samples, is_number)
+        });
+        let mut column = to.column_mut(c);
+        let column = column.as_mut_slice();
+        for (p, (part, answer)) in coefficient.parts.iter().zip(&answers[c]).enumerate() {
+            let (mut row, mut at) = (0, 0);
+            for run in features.runs {
+                let (first, rows) = level.rows(*run);
+                let feature = &features.columns[part.feature][at..at + run.1];
+                let (own, samples) = (first..first + rows, &level.sample[first..first + rows]);
+                for ((x, answer), sample) in column[row..row + rows].iter_mut().zip(&answer[own]).zip(samples)
+                {
+                    let more = answer * f64::from(feature[sample - run.0]) * unit;
+                    *x = if p == 0 { more } else { *x + more };
+                }
+                (row, at) = (row + rows, at + run.1);
+            }
+            count = row;
+        }
+    }
+    count
+}
