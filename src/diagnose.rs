@@ -4,6 +4,7 @@
 //! geometry explains. Every family of the library at every place competes by the evidence for it; what is found is put into the
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
+mod along;
 mod bent;
 mod blocks;
 mod coarse;

@@ -71,14 +71,13 @@ impl Concealed {
             Concealed::Backlash => "backlash",
             Concealed::Cyclic(..) => "cyclic_error",
             Concealed::Scale => "scale_error",
-            Concealed::Slip(_) => "coupling_slip",
+            Concealed::Slip(_) => "setup_slip",
         }
     }
 
-    /// Names that say it: an encoder that loses counts turns all that hangs on its axis from one moment on, as a slip of that frame about
-    /// that axis does.
+    /// An encoder that loses counts turns all that hangs on its axis from one moment on: a slip of the joint, or of its frame about it.
     fn is_named(self, effect: &str) -> bool {
-        effect == self.name() || matches!(self, Concealed::Slip(_)) && effect == "setup_slip"
+        effect == self.name()
     }
 
     /// The largest slope of a wave of unit size.

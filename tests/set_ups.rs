@@ -108,7 +108,8 @@ fn a_slip_without_a_clock_is_dated_by_the_order_of_samples() {
         })
         .collect();
     let mut said = said(&machine, &all);
-    assert_eq!(names(&said), [("coupling_slip", machine.commands()[2].as_str())]);
+    assert_eq!(names(&said), [("setup_slip", machine.commands()[2].as_str())]);
+    assert_eq!(said.findings[0].form.as_deref(), Some("coupling_slip"));
     let size = |name: &str| {
         said.findings[0].coefficients.iter().find(|c| c.name == name).unwrap_or_else(|| panic!("no {name}"))
     };

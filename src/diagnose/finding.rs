@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
+use super::along::along_travel;
 use super::folds;
 use super::held_out::{self, Model};
 use super::noise::Noise;
@@ -190,6 +191,8 @@ const SURPRISE: f64 = 0.003;
 const EVENTS: usize = 2;
 /// Structure counts beyond this many standard deviations of chance.
 const CHANCE: f64 = 5.0;
+/// The same for functions of where a joint stands: chance alone does so in one of some hundred recordings of settled positions.
+const ALONG: f64 = 4.5;
 /// Names of which the data say less than this against the best are listed with it.
 const LISTED: f64 = 0.05;
 /// Where shapes make up less than this part of all, the names are no patches, whatever surprises.
@@ -240,6 +243,14 @@ pub(super) fn report(
         || shares.shapes > ODD_SHAPE * total
             && surprise > CHANCE * left.heat.max(1.0) * deviation
             && surprise > SURPRISE * memory * total;
+    // Settled positions show no course, but they may show a function of where a joint stands.
+    let along = (!is_unexplained && !search.in_motion)
+        .then(|| along_travel(search, machine, &search.beside(active, None)))
+        .flatten()
+        .filter(|along| {
+            along.beyond > ALONG * search.heat && along.energy > TOLERATED * (total + along.energy)
+        });
+    let is_unexplained = is_unexplained || along.is_some();
     let noise_of = |angle: bool| {
         let own = search
             .runs
@@ -332,13 +343,12 @@ pub(super) fn report(
     }
     let unexplained = is_unexplained.then(|| {
         let left_by_geometry = search.base.apply(&search.rows.residual);
-        let at = search
-            .rivals(active)
-            .first()
-            .map_or("measurement".to_string(), |r| search.candidates[r.candidate].place.name(machine));
+        let best = search.rivals(active).first().map(|r| search.candidates[r.candidate].place);
+        let place = along.map(|along| Place::Joint(along.joint)).or(best);
+        let at = place.map_or("measurement".to_string(), |place| place.name(machine));
+        let energy = along.map_or(geometric.energy.max(left.energy), |along| along.energy);
         let sigma = noise_of(false).or(noise_of(true)).unwrap_or(1.0);
-        let rms_m =
-            sigma * (geometric.energy.max(left.energy) / search.rows.whitener.count().max(1) as f64).sqrt();
+        let rms_m = sigma * (energy / search.rows.whitener.count().max(1) as f64).sqrt();
         let size = match noise_of(false) {
             Some(_) => format!("{:.2} um", 1e6 * rms_m),
             None => in_words(rms_m, None, Dimension::ANGLE, None),

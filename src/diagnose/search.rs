@@ -400,7 +400,7 @@ impl Search<'_> {
         let space = Arc::new(self.beside_names(active));
         let best = self.best(rivals, active, &self.leftover(&space))?;
         let is_most = 2.0 * best.score.gain >= HIDDEN * shares.shapes;
-        let is_own = best.score.gain < self.shape_error(best, active);
+        let is_own = best.score.gain < self.shape_error(best, active) || self.is_of_course(best, active);
         let entered = (is_most && !is_own).then(|| self.entered(best, rivals, &space)).flatten();
         entered.map(|effect| Active { hidden: true, ..effect })
     }

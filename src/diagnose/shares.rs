@@ -78,11 +78,23 @@ impl Search<'_> {
         active.iter().any(|a| rival.score.gain < REPEATED * a.score.gain && alike(a))
     }
 
+    /// Whether it changes with time, whatever the axes do.
+    fn goes_by_clock(&self, candidate: usize) -> bool {
+        self.candidates[candidate].features.iter().any(Feature::needs_moment)
+    }
+
+    /// Whether it may be the course over time of what was found: of two courses the smaller one is the other one's shape.
+    pub fn is_of_course(&self, rival: &Rival, active: &[Active]) -> bool {
+        let is_course =
+            |a: &Active| self.goes_by_clock(a.candidate) && rival.score.gain < SHAPE * a.score.gain;
+        self.goes_by_clock(rival.candidate) && active.iter().any(is_course)
+    }
+
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place and where
     /// both go by the clock.
     pub fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
-        let timed = |candidate: usize| self.candidates[candidate].features.iter().any(Feature::needs_moment);
+        let timed = |candidate: usize| self.goes_by_clock(candidate);
         let share = |effect: &Active| {
             if place(effect.candidate) == place(rival.candidate) {
                 OWN_SHAPE
