@@ -313,6 +313,22 @@ fn a_last_digit_that_flickers_at_a_standstill_is_no_reversal() {
 }
 
 #[test]
+fn what_is_left_out_goes_with_its_forms_and_comes_back_by_a_file() {
+    let standard = Library::standard();
+    let family = standard.family("backlash").expect("it is there").clone();
+    assert_eq!(standard.family("worn_stretch").map(|f| f.told_as()), Some("backlash"));
+    let text = format!("Effects(families: [{}])", ron::to_string(&family).expect("a family is RON"));
+    let back = standard.clone().with_text("back.ron", &text).and_then(|l| l.without("backlash"));
+    let back = back.unwrap_or_else(|e| panic!("{e}"));
+    assert!(back.family("backlash").is_some() && back.family("worn_stretch").is_none());
+    assert!(standard.without("backlash").is_ok_and(|l| l.family("worn_stretch").is_none()));
+    // Only files have it: then it goes.
+    let text = text.replacen("backlash", "wear", 1);
+    let worn = Library::standard().with_text("wear.ron", &text).unwrap_or_else(|e| panic!("{e}"));
+    assert!(worn.clone().without("wear").is_ok_and(|l| l.family("wear").is_none()));
+}
+
+#[test]
 fn a_family_left_out_is_gone_and_an_unknown_one_is_told() {
     let library = Library::standard().without("backlash").expect("it is there");
     assert!(library.family("backlash").is_none());

@@ -27,7 +27,7 @@ pub(crate) struct Args {
     /// Families of effects to add to the library, or to replace in it by name
     #[arg(long, value_name = "FILE.ron")]
     effects: Vec<PathBuf>,
-    /// Leave a family out
+    /// Leave a family out, with its forms; one that --effects brings stays
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
     /// Where to write the calibrated machine with what was found
@@ -52,8 +52,12 @@ pub(crate) fn run(args: &Args) -> Outcome {
     for path in &args.effects {
         library = library.with_file(path)?;
     }
+    let known: Vec<String> = library.names().into_iter().map(String::from).collect();
     for name in &args.without {
-        library = library.without(name)?;
+        // A form goes with what it is a form of.
+        if library.family(name).is_some() || !known.contains(name) {
+            library = library.without(name)?;
+        }
     }
     let progress = args.common.progress();
     let request = Request::default();

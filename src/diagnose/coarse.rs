@@ -78,7 +78,10 @@ impl Features {
         let largest: Vec<f64> =
             columns.iter().map(|c| c.iter().fold(0.0, |most, x| x.abs().max(most))).collect();
         let acts = |k: &usize| {
-            columns.iter().zip(&largest).any(|(c, most)| !(c[picked(*k)].abs() <= VANISHES * most))
+            columns.iter().zip(&largest).any(|(c, most)| {
+                let x = c[picked(*k)];
+                !x.is_finite() || x.abs() > VANISHES * most
+            })
         };
         let first = self.runs.len();
         let mut k = 0;

@@ -22,8 +22,8 @@ pub(super) struct Rows<'a> {
     pub residual: DVector<f64>,
     /// Samples put together in blocks, for features that change little within one.
     pub(super) coarse: &'a Coarse,
-    columns: Mutex<HashMap<Key, Arc<Vec<f64>>>>,
-    pub(super) coarse_columns: Mutex<HashMap<(usize, Key), Arc<Vec<f64>>>>,
+    columns: Mutex<HashMap<Key, Column>>,
+    pub(super) coarse_columns: Mutex<HashMap<(usize, Key), Column>>,
 }
 
 /// What all candidates are judged against: the space, and the residuals beside it, fine and coarse.
@@ -35,6 +35,13 @@ pub(super) struct Field {
     pub(super) coarse: Vec<OnceLock<(Space, DVector<f64>)>>,
 }
 
+/// A column that several candidates share.
+type Column = Arc<Vec<f64>>;
+
+/// What is done with a point's Gram matrix and its way to the residuals.
+type Take<'a> = dyn FnMut(usize, &DMatrix<f64>, &DVector<f64>) + 'a;
+
+/// What tells a column: kind of slot, joint, direction.
 pub(super) type Key = (usize, usize, [u64; 6]);
 
 /// A candidate at its best.
@@ -283,7 +290,7 @@ pub(super) fn judge(
     space: &Space,
     left: &DVector<f64>,
     points: &[usize],
-    take: &mut dyn FnMut(usize, &DMatrix<f64>, &DVector<f64>),
+    take: &mut Take,
 ) {
     let k = joined.ncols() / points.len().max(1);
     let (along, toward) = (space.along(joined), joined.tr_mul(left));

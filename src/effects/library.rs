@@ -55,6 +55,8 @@ struct LibraryForm {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Library {
     families: Vec<Family>,
+    /// So many of them, the last ones, are from files.
+    added: usize,
 }
 
 impl Library {
@@ -63,8 +65,9 @@ impl Library {
     /// # Panics
     /// Never: a test reads it.
     pub fn standard() -> Self {
-        let none = Library { families: Vec::new() };
-        none.with_text("library.ron", STANDARD).expect("a test reads the standard library")
+        let none = Library { families: Vec::new(), added: 0 };
+        let read = none.with_text("library.ron", STANDARD).expect("a test reads the standard library");
+        Library { added: 0, ..read }
     }
 
     /// This library with the families of a file added; those whose name it has already are replaced.
@@ -114,7 +117,11 @@ impl Library {
                 }
             }
         }
-        self.families.retain(|old| form.families.iter().all(|new| new.name != old.name));
+        let own = self.families.len() - self.added;
+        let is_replaced = |old: &Family| form.families.iter().any(|new| new.name == old.name);
+        let replaced = self.families[own..].iter().filter(|old| is_replaced(old)).count();
+        self.families.retain(|old| !is_replaced(old));
+        self.added += form.families.len() - replaced;
         let kept = self.families.len();
         self.families.extend(form.families);
         for (i, family) in self.families[kept..].iter().enumerate() {
@@ -137,7 +144,8 @@ impl Library {
         Ok(self)
     }
 
-    /// This library without the families of this name and the forms of it; what named them as look-alikes no longer does.
+    /// This library without the families of this name and the forms of it; what named them as look-alikes no longer does. Families that
+    /// a file has added stay, unless there are no others of this name: what was left out can be put back by a file.
     ///
     /// # Errors
     /// [`Error::Undetermined`] if there is none.
@@ -148,7 +156,15 @@ impl Library {
                 mend: format!("name one of: {}", self.names().join(", ")),
             });
         }
-        self.families.retain(|family| family.name != name && family.told_as() != name);
+        let meant = |family: &Family| family.name == name || family.told_as() == name;
+        let own = self.families.len() - self.added;
+        let from_files = self.families.split_off(own);
+        let is_own = self.families.iter().any(meant);
+        self.families.retain(|family| !meant(family));
+        let from_files = from_files.into_iter().filter(|family| is_own || !meant(family));
+        let before = self.families.len();
+        self.families.extend(from_files);
+        self.added = self.families.len() - before;
         let kept: Vec<String> = self.families.iter().map(|family| family.name.clone()).collect();
         for family in &mut self.families {
             family.look_alikes.retain(|other| kept.contains(&other.effect));
