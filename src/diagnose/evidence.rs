@@ -94,3 +94,19 @@ pub(super) fn log_mean_exp(logs: &[f64]) -> f64 {
     }
     most + (logs.iter().map(|l| (l - most).exp()).sum::<f64>() / logs.len() as f64).ln()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_hardly_seen_is_no_larger_than_what_is_seen() {
+        // Two combinations are seen to a thousandth of the size, and are a hundredth of it; the third is not seen at all.
+        let gram = DMatrix::from_diagonal(&DVector::from_vec(vec![1e6, 1e6, 0.0]));
+        let g = DVector::from_vec(vec![1e4, -1e4, 0.0]);
+        let part = likely_part(&gram, &g, 1.0);
+        assert!((0.01..0.04).contains(&part), "{part}");
+        // Large ones keep the size that they have.
+        assert_eq!(likely_part(&gram, &(100.0 * &g), 1.0), 1.0);
+    }
+}

@@ -236,7 +236,9 @@ pub(super) fn report(
     let (left, total) = (&shares.left, shares.total());
     let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
     let memory = noise.iter().map(Noise::memory).fold(1.0, f64::max);
-    let is_unexplained = left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
+    let patched = search.patched(active);
+    let is_unexplained = patched.is_some()
+        || left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
         || left.beyond > CHANCE && search.in_motion && active.len() >= search.most()
         || active.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
         || shares.is_misshapen(active.len())
@@ -344,7 +346,7 @@ pub(super) fn report(
     let unexplained = is_unexplained.then(|| {
         let left_by_geometry = search.base.apply(&search.rows.residual);
         let best = search.rivals(active).first().map(|r| search.candidates[r.candidate].place);
-        let place = along.map(|along| Place::Joint(along.joint)).or(best);
+        let place = patched.or(along.map(|along| Place::Joint(along.joint))).or(best);
         let at = place.map_or("measurement".to_string(), |place| place.name(machine));
         let energy = along.map_or(geometric.energy.max(left.energy), |along| along.energy);
         let sigma = noise_of(false).or(noise_of(true)).unwrap_or(1.0);

@@ -124,11 +124,15 @@ pub(super) fn is_of_curve(curve: &Candidate, other: &Candidate) -> bool {
 
 /// Whether it depends on where one joint stands and on nothing else, and is no wave.
 fn is_along_travel(candidate: &Candidate) -> bool {
+    is_of_position(candidate) && candidate.features.iter().all(|f| f.wave().is_none())
+}
+
+/// Whether it depends on where one joint stands and on nothing else.
+pub(super) fn is_of_position(candidate: &Candidate) -> bool {
     !candidate.features.is_empty()
         && candidate.features.iter().all(|f| {
             !(f.needs_history() || f.needs_rates() || f.needs_gravity() || f.needs_moment())
                 && f.channels().is_empty()
-                && f.wave().is_none()
                 && f.joints().len() == 1
         })
 }

@@ -4,6 +4,7 @@ use super::leftover::Leftover;
 use super::search::{Active, Rival, Search};
 use super::shape;
 use super::space::Space;
+use crate::effects::Place;
 use crate::feature::Feature;
 
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
@@ -15,6 +16,9 @@ const CLOCK_SHAPE: f64 = 0.01;
 const REPEATED: f64 = 0.15;
 /// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
 const SHAPE: f64 = 0.35;
+
+/// So many functions of where a joint stands may be found at one joint.
+const PATCHES: usize = 2;
 
 /// Where the energy goes that constant geometry leaves over, in units of the noise's variance.
 pub(super) struct Shares {
@@ -59,6 +63,16 @@ impl Search<'_> {
     pub fn is_event(&self, candidate: usize) -> bool {
         let candidate = &self.candidates[candidate];
         candidate.jumps() && candidate.features.iter().any(Feature::needs_moment)
+    }
+
+    /// A joint at which more effects than that are functions of where it stands: each a patch of a curve that has no name.
+    pub fn patched(&self, active: &[Active]) -> Option<Place> {
+        let of_position = active
+            .iter()
+            .map(|effect| &self.candidates[effect.candidate])
+            .filter(|c| shape::is_of_position(c));
+        let places: Vec<Place> = of_position.map(|candidate| candidate.place).collect();
+        places.iter().copied().find(|place| places.iter().filter(|other| *other == place).count() > PATCHES)
     }
 
     /// Whether two candidates are forms of one effect at one place.
