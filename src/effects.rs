@@ -17,6 +17,7 @@ mod library;
 mod place;
 mod quantity;
 mod scan;
+mod wave;
 mod window;
 
 pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Skipped};

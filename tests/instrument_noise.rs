@@ -7,6 +7,7 @@ use kincal::diagnose::{Diagnosis, Request, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 /// To and fro over 320 mm in 4000 readings: `scale` (1) of the axis, noise of 1 um that remembers `rho` of itself, rounded to `step` (mm).
 fn recording(machine: &Machine, scale: f64, rho: f64, step: f64, seed: u64) -> Recording {
@@ -36,7 +37,8 @@ fn said(scale: f64, rho: f64, step: f64, seed: u64) -> Result<Diagnosis, TestCas
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(6))]
+    // The same draws each time: in one of some hundred, chance itself looks like structure, as the engine's odds say.
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(6) })]
 
     #[test]
     fn noise_that_remembers_and_is_rounded_is_no_structure(rho in 0.3..0.85f64, step in 0.0005..0.0015f64, seed in any::<u64>()) {

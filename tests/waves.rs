@@ -8,6 +8,7 @@ use kincal::diagnose::{Request, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 /// Noise of unit variance; the sum of four even numbers is near enough to normal.
 fn normals(seed: u64) -> impl FnMut() -> f64 {
@@ -24,11 +25,13 @@ fn normals(seed: u64) -> impl FnMut() -> f64 {
 }
 
 /// Sixty targets about 10 mm apart, not quite evenly, approached from either side three times: 2 um of a wave and 0.4 um of noise.
+/// The targets are the same in every draw: once in some hundred, chance would lay them so evenly that they hide a wave.
 fn targets(machine: &kincal::Machine, period: f64, phase: f64, seed: u64) -> Recording {
     let mut text =
         String::from("# measurement: joint\n# zero: unknown\nt[s],x[mm],x_direction[1],x_meas[mm]\n");
     let mut noise = normals(seed);
-    let targets: Vec<f64> = (0..60).map(|k| 10.0 * f64::from(k) + 1.8 * noise().clamp(-1.7, 1.7)).collect();
+    let mut apart = normals(1);
+    let targets: Vec<f64> = (0..60).map(|k| 10.0 * f64::from(k) + 1.8 * apart().clamp(-1.7, 1.7)).collect();
     let mut t = 0.0;
     for _ in 0..3 {
         let there = targets.iter().map(|x| (x, 1));
@@ -67,7 +70,8 @@ fn is_told(machine: &kincal::Machine, recording: Recording, period: f64) -> Resu
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    // The same draws each time: in one of some hundred, chance itself looks like structure, as the engine's odds say.
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(12) })]
 
     #[test]
     fn a_wave_is_told_with_its_own_period(period in 4.0..40.0f64, phase in 0.0..TAU, seed in any::<u64>()) {

@@ -11,6 +11,10 @@ const PARABOLAS: usize = 12;
 const WORTHWHILE: f64 = 0.3;
 const HALVINGS: usize = 9;
 
+/// A wave of half the period comes first unless it falls behind by this, a logarithm: hardly any machine's error is nothing but an
+/// overtone.
+const OVERTONE: f64 = 4.0;
+
 /// Weight of what cannot be.
 const NEVER: f64 = -1e6;
 
@@ -24,7 +28,13 @@ pub(super) fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &
         let start = Rival { weight: rival.weight - lower, score, ..rival.clone() };
         Some(refined(rows, candidate, &start, field, heat))
     });
-    others.fold(best, |best, other| if other.weight > best.weight { other } else { best })
+    let all: Vec<Rival> = others.chain([best.clone()]).collect();
+    let weight = |r: &Rival| {
+        let has_half =
+            all.iter().any(|other| candidate.is_half(&other.score.parameters, &r.score.parameters));
+        r.weight - if has_half { OVERTONE } else { 0.0 }
+    };
+    all.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))).cloned().unwrap_or(best)
 }
 
 /// The same from one point; the evidence over the grid grows alike.

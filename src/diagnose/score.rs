@@ -313,7 +313,7 @@ pub(super) fn best(
     g: &DVector<f64>,
     heat: f64,
 ) -> Best {
-    let lengths = if has_overtones(candidate, at) { lengths } else { &lengths[..1] };
+    let lengths = if candidate.has_overtones(at) { lengths } else { &lengths[..1] };
     let all: Vec<Worth> = lengths.iter().map(|length| evidence(gram, g, *length, heat)).collect();
     let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
     let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
@@ -338,7 +338,7 @@ const WAVES: usize = 64;
 /// Best points that are looked at finely.
 const FINE: usize = 6;
 /// Of those, the ones with this part of the best one's evidence may be better once they are refined.
-const NEARLY: f64 = 0.85;
+const NEARLY: f64 = 0.7;
 
 /// The best of these points, and the evidence of all.
 fn summary(grid: &[Vec<f64>], table: &[Option<Best>], points: &[usize]) -> Option<Score> {
@@ -407,18 +407,6 @@ pub(super) fn is_of_number(coefficient: &Coefficient) -> bool {
 
 fn is_travel(dimension: Dimension) -> bool {
     [Dimension::LENGTH, Dimension::ANGLE].contains(&dimension)
-}
-
-/// Whether a wave's overtone is within its family's range too: what is finer than positions lie apart looks like something coarse.
-fn has_overtones(candidate: &Candidate, at: &[f64]) -> bool {
-    let is_wave = candidate.features.iter().all(|f| f.wave().is_some());
-    match (&candidate.parameters[..], at) {
-        ([order], [x]) if is_wave && order.dimension == Dimension::ONE => {
-            order.whole || 2.0 * x <= order.range.1
-        }
-        ([period], [x]) if is_wave && is_travel(period.dimension) => 0.5 * x >= period.range.0,
-        _ => true,
-    }
 }
 
 /// How many coefficients may take part: all, or those of the first features from `least` on.
