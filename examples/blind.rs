@@ -41,6 +41,9 @@ struct Arguments {
     /// Passes `--without NAME` to `kincal diagnose`.
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
+    /// With `--judge`: diagnoses cases of a single effect with its family left out of the library.
+    #[arg(long)]
+    left_out: bool,
     /// Textbook shapes and white noise, or neither.
     #[arg(long, value_enum, default_value = "standard")]
     kind: Kinds,
@@ -103,7 +106,11 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     if let Some(folder) = &arguments.write {
         harness::write(folder, kind, mode, arguments.seed, arguments.count)?;
     }
-    if let Some(folder) = &arguments.judge {
+    if let Some(folder) = arguments.judge.as_ref().filter(|_| arguments.left_out) {
+        let said = harness::left_out::judge(folder, &engine(arguments)?, &harness::machine_folder())?;
+        said.broken.iter().chain(&said.told).for_each(|line| println!("{line}"));
+        println!("\n{}", table::left_out(&said));
+    } else if let Some(folder) = &arguments.judge {
         let score = match arguments.baseline {
             Some(Baselines::Ranked) => harness::judge(folder, &Baseline::Ranked)?,
             Some(Baselines::Stepwise) => harness::judge(folder, &Baseline::Stepwise)?,
@@ -177,6 +184,8 @@ fn both(folder: &Path, engine: &Engine, count: usize, seed: u64, out: &mut Strin
         let score = harness::judge(&own, engine)?;
         let _ = writeln!(out, "### {word}: {} cases\n\n{}", score.cases, table::markdown(&score, kind));
         let _ = writeln!(out, "{}\n{}", table::confusion(&score), table::calibration(&score));
+        let left_out = harness::left_out::judge(&own, engine, &harness::machine_folder())?;
+        let _ = writeln!(out, "{}", table::left_out(&left_out));
         let methods = [Baseline::Ranked, Baseline::Stepwise, Baseline::Lasso];
         let mut others = Vec::new();
         for method in methods {

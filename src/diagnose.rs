@@ -9,6 +9,7 @@ mod bent;
 mod blocks;
 mod coarse;
 mod contained;
+mod diagnosis;
 mod evidence;
 mod finding;
 mod folds;
@@ -17,9 +18,11 @@ mod leftover;
 mod model;
 mod noise;
 mod not_tried;
+mod odds;
 mod outliers;
 mod reach;
 mod refine;
+mod report;
 mod score;
 mod search;
 mod shape;
@@ -31,9 +34,11 @@ mod stretch;
 mod traces;
 mod unexplained;
 mod waves;
+mod whereabouts;
 mod whitener;
 
-pub use finding::{Confusable, Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Size};
+pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
+pub use finding::{Confusable, Finding, HeldOutPair, Size};
 pub use not_tried::NotTried;
 pub use outliers::{Outliers, WithoutOutliers};
 pub use stretch::Where;
@@ -120,9 +125,9 @@ pub fn diagnose(
             grounds: RefCell::default(),
         };
         active = search.run(&active);
-        let judged = noise_of(&linear, &finding::residual_of(&search, &active), &runs, &out, &facts);
+        let judged = noise_of(&linear, &report::residual_of(&search, &active), &runs, &out, &facts);
         let report = |search: &Search, active: &[Active]| -> Diagnosis {
-            let mut diagnosis = finding::report(search, active, machine, library, &noise);
+            let mut diagnosis = report::report(search, active, machine, library, &noise);
             diagnosis.not_tried = not_tried(&candidates);
             diagnosis
         };

@@ -231,8 +231,8 @@ fn the_engine_names_what_a_few_blind_cases_conceal() {
     }
     let text = serde_json::to_string(&answers).expect("JSON");
     std::fs::write(folder.join("answers.json"), text).expect("written");
-    let score =
-        harness::judge(&folder, &Engine::new(PathBuf::from(env!("CARGO_BIN_EXE_kincal")))).expect("readable");
+    let engine = Engine::new(PathBuf::from(env!("CARGO_BIN_EXE_kincal")));
+    let score = harness::judge(&folder, &engine).expect("readable");
     println!("{}", harness::table::terminal(&score, Kind::Standard));
     assert!(score.broken.is_empty(), "{:?}", score.broken);
     // Reached: 6 of 6, 1.0, 2 of 2, 0; 1 of 2 odd ones unexplained and the other given wrong names; 1 of 12 worse on the judge's path.
@@ -242,4 +242,10 @@ fn the_engine_names_what_a_few_blind_cases_conceal() {
     assert!(score.needless_one <= 1, "{:?}", score.failures);
     assert!(score.odd_unexplained.hits >= 1 && score.odd_wrong.hits <= 1, "{:?}", score.failures);
     assert!(score.judged_worse.hits <= 2, "{:?}", score.judged_worse);
+    // The same single effects with their families left out.
+    let all = harness::left_out::judge(&folder, &engine, &harness::machine_folder()).expect("readable");
+    println!("{}", harness::table::left_out(&all));
+    assert!(all.broken.is_empty(), "{:?}", all.broken);
+    assert!(2 * all.unexplained.hits >= all.unexplained.of, "{:?}", all.told);
+    assert!(2 * all.at_its_place.hits >= all.at_its_place.of, "{:?}", all.told);
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::finding::{Diagnosis, HeldOutPair, HeldOutRms, rms_of};
+use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
+use super::finding::HeldOutPair;
 use super::search::{Active, Search};
 use super::space::gram;
 
@@ -58,17 +59,16 @@ pub(super) fn surprise(search: &Search, active: &[Active]) -> Option<(f64, f64)>
 
 /// The effect without which stretches that are left out are foretold best, where that is better than with all, (68): a patch.
 pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
-    let normal = Normal::new(search, active)?;
-    let all = normal.foretold(None)?;
-    let without = (0..active.len()).filter_map(|i| Some((i, normal.foretold(Some(i))?)));
-    without.filter(|(_, score)| *score > all).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    let without = foretold_without(search, active)?;
+    (0..without.len()).filter(|i| without[*i] > 0.0).max_by(|a, b| without[*a].total_cmp(&without[*b]))
 }
 
-/// Of each effect, whether stretches that are left out are foretold better without it, (68).
-fn foretold(search: &Search, active: &[Active]) -> Option<Vec<bool>> {
+/// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68).
+fn foretold_without(search: &Search, active: &[Active]) -> Option<Vec<f64>> {
     let normal = Normal::new(search, active)?;
     let all = normal.foretold(None)?;
-    Some((0..active.len()).map(|i| normal.foretold(Some(i)).is_some_and(|without| without > all)).collect())
+    let without = |i| normal.foretold(Some(i)).map_or(f64::NEG_INFINITY, |without| without - all);
+    Some((0..active.len()).map(without).collect())
 }
 
 /// Whitened normal equations of each fold, with everything that an effect brings along: states and shape.
@@ -166,8 +166,8 @@ fn grams(
 pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Active> {
     let mut kept = active.to_vec();
     while let Some(folds) = Folds::new(search, &kept) {
-        let foretold = search.in_motion.then(|| foretold(search, &kept)).flatten();
-        let is_harm = |i: usize| foretold.as_ref().is_none_or(|harms| harms[i]);
+        let foretold = search.in_motion.then(|| foretold_without(search, &kept)).flatten();
+        let is_harm = |i: usize| foretold.as_ref().is_none_or(|without| without[i] > 0.0);
         let each = folds.without_each(search, &kept).into_iter().enumerate();
         let better = each.filter(|(i, b)| *b > factor && is_harm(*i));
         match better.max_by(|a, b| a.1.total_cmp(&b.1)) {

@@ -116,7 +116,7 @@ impl Model {
                 let raw = search.rows.raw_with_units(candidate, &moved, &units)?;
                 let weights = DVector::from_fn(k, |c, _| coefficients[c] / units[c].max(1e-300));
                 let sum = raw.columns(0, k) * weights;
-                let mut white = super::finding::zeros(search);
+                let mut white = DVector::<f64>::zeros(search.rows.linear.residual.len());
                 search.rows.whitener.apply(sum.as_slice(), white.as_mut_slice());
                 Some(white)
             };

@@ -1,7 +1,7 @@
 //! The result as a machine: constant deviations and the effects that were found, fitted together on the real model.
 
 use super::Diagnosis;
-use super::finding::{Named, RmsByModel};
+use super::diagnosis::{Named, RmsByModel};
 use crate::calibration::{CalibratedMachine, terms};
 use crate::effects::{RecordingFacts, StoredEffect};
 use crate::error::{Error, Result};

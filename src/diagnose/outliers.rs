@@ -4,7 +4,7 @@
 
 use serde::Serialize;
 
-use super::finding::{Diagnosis, rms_of};
+use super::diagnosis::{Diagnosis, rms_of};
 use super::search::Search;
 
 /// Samples of one recording that lie far off their surroundings whatever is taken away.

@@ -407,7 +407,8 @@ impl Search<'_> {
 
     /// The best rival that is neither chance nor what was found already.
     fn best<'r>(&self, rivals: &'r [Rival], active: &[Active], before: &Leftover) -> Option<&'r Rival> {
-        let is_chance = |r: &Rival| r.weight <= ENTER * if self.is_tone(r) { before.band } else { 1.0 };
+        let is_chance =
+            |r: &Rival| r.weight <= ENTER * if self.is_tone(r.candidate) { before.band } else { 1.0 };
         let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
         worthy.find(|r| !is_chance(r) && !self.repeats(r, active))
     }

@@ -17,6 +17,11 @@ const REPEATED: f64 = 0.15;
 /// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
 const SHAPE: f64 = 0.35;
 
+/// Along a path, where everything shows its shape, it is no more than this part in effects that have their right name, and this many
+/// standard deviations of chance.
+const UNLIKE: f64 = 0.1;
+const CHANCE: f64 = 3.0;
+
 /// So many functions of where a joint stands may be found at one joint.
 const PATCHES: usize = 2;
 
@@ -28,6 +33,8 @@ pub(super) struct Shares {
     pub shapes: f64,
     /// With nothing.
     pub left: Leftover,
+    /// How many parameters the shapes have.
+    freedom: f64,
 }
 
 impl Shares {
@@ -41,6 +48,11 @@ impl Shares {
         let several = effects.max(2) - 1;
         self.shapes > SHAPE * self.total() / (several as f64).sqrt()
     }
+
+    /// Whether the shapes depart farther from the families' than those of a right name do.
+    pub fn is_unlike(&self) -> bool {
+        self.shapes > UNLIKE * self.total() + CHANCE * self.left.heat * (2.0 * self.freedom).sqrt()
+    }
 }
 
 impl Search<'_> {
@@ -51,12 +63,17 @@ impl Search<'_> {
         let taken = |from: &Space, to: &Space| {
             (energy(from) - energy(to) - (to.parameters() - from.parameters())).max(0.0)
         };
-        Shares { names: taken(&self.base, &names), shapes: taken(&names, &full), left: self.leftover(&full) }
+        Shares {
+            names: taken(&self.base, &names),
+            shapes: taken(&names, &full),
+            left: self.leftover(&full),
+            freedom: full.parameters() - names.parameters(),
+        }
     }
 
     /// Whether it is a wave in time: noise whose colour is not quite known has many.
-    pub fn is_tone(&self, rival: &Rival) -> bool {
-        self.candidates[rival.candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
+    pub fn is_tone(&self, candidate: usize) -> bool {
+        self.candidates[candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
     }
 
     /// Whether it happens at one moment of the recordings, or from one sample on.
@@ -112,7 +129,7 @@ impl Search<'_> {
         let share = |effect: &Active| {
             if place(effect.candidate) == place(rival.candidate) {
                 OWN_SHAPE
-            } else if self.is_tone(rival) || timed(effect.candidate) && timed(rival.candidate) {
+            } else if self.is_tone(rival.candidate) || timed(effect.candidate) && timed(rival.candidate) {
                 CLOCK_SHAPE
             } else {
                 OTHER_SHAPE

@@ -1,6 +1,6 @@
 //! What pictures of a diagnosis show: residuals sample by sample, and what goes with each finding.
 
-use super::finding::Diagnosis;
+use super::diagnosis::Diagnosis;
 use super::held_out::Model;
 use super::search::{Active, Search};
 use crate::effects::Place;

@@ -63,6 +63,8 @@ const FEW: usize = 16;
 const TARGET: f64 = 0.02;
 /// A joint that stands still from one settled position to the next is seen to move by less than this part of its usual step.
 const REST: f64 = 1e-3;
+/// A tone is not followed over more than so many times the longest recording.
+const MOST_FOLLOWED: f64 = 8.0;
 /// Positions closer than this part of the travel are one.
 const ALIKE: f64 = 1e-6;
 
@@ -217,6 +219,15 @@ impl RecordingFacts {
             };
         }
         Ok(span)
+    }
+
+    /// How long a tone is followed, s: on one clock from the first recording to the last, over pauses that are not too long; its frequency
+    /// is as sharp as that.
+    pub fn followed(&self) -> f64 {
+        match self.time.filter(|_| self.one_clock) {
+            Some((first, last)) => (last - first).min(MOST_FOLLOWED * self.longest),
+            None => self.longest,
+        }
     }
 
     /// Whether the joint of dyad `j` moves.

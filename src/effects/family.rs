@@ -249,7 +249,7 @@ pub enum Grid {
     Orders(f64),
     /// Periods: one over them grows by this part of one over the travel (or time) seen.
     Periods(f64),
-    /// Frequencies: they grow by this part of one over the longest recording.
+    /// Frequencies: they grow by this part of one over the time from the first recording to the last, or over eight times the longest one.
     Frequencies(f64),
     /// Steps of this part of another parameter's value.
     Within(String, f64),

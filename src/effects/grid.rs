@@ -131,7 +131,7 @@ pub(super) fn points(
                     even(least, most, parts.min(MOST_POINTS)).into_iter().rev().map(f64::recip).collect()
                 }
                 Grid::Frequencies(part) => {
-                    let parts = ((to - from) * facts.longest.max(1e-9) / part).ceil().max(1.0) as usize;
+                    let parts = ((to - from) * facts.followed().max(1e-9) / part).ceil().max(1.0) as usize;
                     even(from, to, parts.min(MOST_POINTS))
                 }
                 Grid::Within(other, part) => {

@@ -10,6 +10,7 @@ pub mod body;
 pub mod case;
 pub mod effect;
 pub mod folder;
+pub mod left_out;
 pub mod odd;
 pub mod path;
 pub mod random;

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::case::Kind;
+use super::left_out::LeftOut;
 use super::score::{Count, Score, median};
 
 fn percent(count: Count) -> String {
@@ -173,6 +174,21 @@ pub fn terminal(score: &Score, kind: Kind) -> String {
     let _ = writeln!(out, "\n{} cases, {} failed:", score.cases, score.failures.len() + score.broken.len());
     for line in score.broken.iter().chain(&score.failures) {
         let _ = writeln!(out, "  {line}");
+    }
+    out
+}
+
+/// What is said with the true family left out, in Markdown.
+pub fn left_out(all: &LeftOut) -> String {
+    let rows = [
+        ("`unexplained` given", all.unexplained),
+        ("of these, at the effect's joint or frame", all.at_its_place),
+        ("another name with probability > 0.5", all.misnamed),
+        ("nothing said", all.silent),
+    ];
+    let mut out = String::from("| one effect, its family left out (`--without`) | is |\n| --- | --- |\n");
+    for (figure, count) in rows {
+        let _ = writeln!(out, "| {figure} | {} |", percent(count));
     }
     out
 }

@@ -32,6 +32,8 @@ pub struct Verdict {
     pub findings: Vec<Finding>,
     /// Where something is left that has no name.
     pub unexplained: Option<String>,
+    /// Part of the structure that the named effects' shapes take up.
+    pub shape_share: Option<f64>,
     /// RMS on data not used for the fit, with everything found modelled, m or rad.
     pub held_out: Option<f64>,
     /// RMS error on the judge's path: plain calibration, diagnosed model.
@@ -65,6 +67,17 @@ impl Engine {
     pub fn new(binary: PathBuf) -> Self {
         let scratch = std::env::temp_dir().join(format!("kincal-blind-{}", std::process::id()));
         Engine { binary, scratch, extra: Vec::new(), judged: true }
+    }
+
+    /// The same for one case, with families left out and no path to be judged on.
+    pub fn without(&self, names: &[&String], label: &str) -> Self {
+        let left_out = names.iter().flat_map(|name| ["--without".to_string(), (*name).clone()]);
+        Engine {
+            binary: self.binary.clone(),
+            scratch: self.scratch.join(format!("{label}-left-out")),
+            extra: self.extra.iter().cloned().chain(left_out).collect(),
+            judged: false,
+        }
     }
 
     fn call(&self, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<(), String> {
@@ -158,6 +171,7 @@ impl Verdict {
         Verdict {
             findings: list(&json["findings"]).iter().map(finding).collect(),
             unexplained: (!json["unexplained"].is_null()).then(|| text(&json["unexplained"]["at"])),
+            shape_share: json["shape_share"].as_f64(),
             held_out: held.iter().find_map(|h| json[*h]["final"].as_f64()),
             judged: None,
             seconds: 0.0,

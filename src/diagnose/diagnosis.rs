@@ -1,0 +1,120 @@
+//! What a diagnosis says, as data: `docs/diagnosis.md`.
+
+use serde::Serialize;
+
+use super::finding::Finding;
+use super::not_tried::NotTried;
+use super::outliers::{Outliers, WithoutOutliers};
+use super::search::Search;
+use super::traces::Traces;
+use super::unexplained::Unexplained;
+use crate::effects::StoredEffect;
+use crate::identify::BeforeAfter;
+use crate::location::LocationErrors;
+
+/// Everything that a diagnosis has to say. Numbers in SI; `docs/diagnosis.md` lists the fields.
+#[derive(Clone, Debug, Serialize)]
+pub struct Diagnosis {
+    /// Name of the machine.
+    pub machine: String,
+    /// File names.
+    pub recordings: Vec<String>,
+    /// Samples judged.
+    pub samples: u64,
+    /// Standard deviation of the noise of lengths, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor_m: Option<f64>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_floor_rad: Option<f64>,
+    /// RMS of lengths under three models, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_m: Option<RmsByModel>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_rad: Option<RmsByModel>,
+    /// RMS of lengths over stretches that were left out of the fit, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_rms_m: Option<HeldOutRms>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_rms_rad: Option<HeldOutRms>,
+    /// What was found, strongest evidence first.
+    pub findings: Vec<Finding>,
+    /// What no family explains.
+    pub unexplained: Option<Unexplained>,
+    /// Part of the structure left over by geometry that is no family's shape, 0 to 1, where something was found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape_share: Option<f64>,
+    /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
+    #[serde(skip)]
+    pub(super) named: Vec<Named>,
+    /// Effects that could not be looked for in these recordings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_tried: Vec<NotTried>,
+    /// Rows left out because a number was missing.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub dropped: u64,
+    /// Samples that were left out because they lie far off.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub outliers: Vec<Outliers>,
+    /// RMS of lengths without them, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_without_outliers_m: Option<WithoutOutliers>,
+    /// The same of angles, rad.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_without_outliers_rad: Option<WithoutOutliers>,
+    /// What its pictures show.
+    #[serde(skip)]
+    pub traces: Traces,
+    /// The geometry as ISO 230-1 location errors.
+    #[serde(skip)]
+    pub location_errors: LocationErrors,
+}
+
+/// An effect that was found, as it is put into the model.
+#[derive(Clone, Debug)]
+pub(super) struct Named {
+    pub effect: StoredEffect,
+    /// Standard deviation of the prior of each of its terms, in the coefficient's unit.
+    pub scales: Vec<f64>,
+}
+
+/// RMS under three models.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct RmsByModel {
+    /// The machine as declared.
+    pub nominal: f64,
+    /// With constant deviations.
+    pub geometric: f64,
+    /// With what was found besides.
+    pub r#final: f64,
+}
+
+/// Held-out RMS under two models.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct HeldOutRms {
+    /// With constant deviations.
+    pub geometric: f64,
+    /// With what was found besides.
+    pub r#final: f64,
+}
+
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+pub(super) fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {
+    let (fit, last) = (fit?, last?);
+    Some(RmsByModel { nominal: fit.nominal, geometric: fit.geometric, r#final: last })
+}
+
+/// Root mean square over samples of the norm of residual lengths or angles.
+pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
+    let linear = search.rows.linear;
+    let rows = || (0..residual.len()).filter(|row| linear.angle[*row] == angle);
+    let mut samples: Vec<usize> = rows().map(|row| linear.sample[row]).collect();
+    samples.dedup();
+    let squares: f64 = rows().map(|row| residual[row] * residual[row]).sum();
+    (!samples.is_empty()).then(|| (squares / samples.len() as f64).sqrt())
+}

@@ -1,0 +1,94 @@
+//! How likely a name is among its rivals, and which of them are told with it, `docs/diagnosis.md` (64).
+
+use super::finding::Confusable;
+use super::search::{Rival, Search, VISIBLE};
+use crate::effects::{Family, Place};
+use crate::machine::Machine;
+
+/// Names of which the data say less than this against the best are listed with it.
+const LISTED: f64 = 0.05;
+/// How often the true shape of an effect is none of its family's, and the part of its energy by which that may shift the odds of other
+/// names for the same place, and of its own name at other places.
+const UNSURE: f64 = 0.2;
+const SHIFT: f64 = 0.002;
+/// Names that are so likely besides the best one, as their weights may shift, are listed too.
+const ALIKE: f64 = 0.12;
+/// But no names that are so much rarer, as a logarithm.
+const RARER: f64 = 1.2;
+/// Trust in names falls where shapes take up more than this part of the structure, to this at least, and by half where the evidence is
+/// no more than this.
+const ODDER: f64 = 0.12;
+const LEAST: f64 = 0.55;
+const SLIGHT: f64 = 30.0;
+
+/// What one rival has for itself.
+pub(super) struct Odds<'a> {
+    pub rival: &'a Rival,
+    pub probability: f64,
+    /// Whether it is told beside the best one.
+    pub is_listed: bool,
+}
+/// How often a name is right that evidence alone makes certain, on cases whose answers are known: less where shapes take up much
+/// (`shape`, a part of the structure), and where the evidence (`bic`, twice its logarithm) is slight.
+pub(super) fn trust(shape: f64, bic: f64) -> f64 {
+    let (odd, slight) = ((shape / ODDER).powi(3), (SLIGHT / bic.max(1e-9)).powi(2));
+    (LEAST + (1.0 - LEAST) / (1.0 + odd)) / (1.0 + slight)
+}
+
+/// Probability of every rival, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.
+/// `heat`: that of the weights, `is_plain`: a common family in its own shape.
+pub(super) fn odds<'a>(
+    search: &Search,
+    rivals: &'a [Rival],
+    own: &Rival,
+    heat: f64,
+    is_plain: bool,
+) -> Vec<Odds<'a>> {
+    let unsure = if is_plain { 0.0 } else { UNSURE };
+    let place = |r: &Rival| search.candidates[r.candidate].place;
+    let effect = |r: &Rival| &search.candidates[r.candidate].told_as;
+    let plain = |r: &Rival| (r.weight - own.weight).exp();
+    let visible = VISIBLE * search.rows.whitener.count() as f64;
+    let shift = 1.0 + (SHIFT * own.score.gain).min(visible) / heat;
+    // Another name at its place, or the same at another place.
+    let is_alike = |r: &Rival| place(r) == place(own) || effect(r) == effect(own);
+    let is_same = |r: &Rival| search.is_form(r.candidate, own.candidate);
+    let shifted = |r: &Rival| {
+        if is_alike(r) { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
+    };
+    let nothing = (-own.weight).exp();
+    let (all, all_alike) =
+        (rivals.iter().map(plain).sum::<f64>() + nothing, rivals.iter().map(shifted).sum::<f64>());
+    let beside = rivals.iter().filter(|r| is_alike(r)).map(plain).sum::<f64>() / all;
+    let probability = |r: &Rival| (1.0 - unsure) * plain(r) / all + unsure * beside * shifted(r) / all_alike;
+    let is_common = |r: &Rival| search.commonness[r.candidate] > search.commonness[own.candidate] - RARER;
+    let listed = |r: &Rival| {
+        probability(r) > LISTED * probability(own) || !is_plain && shifted(r) > ALIKE && is_common(r)
+    };
+    let one =
+        |rival| Odds { rival, probability: probability(rival), is_listed: !is_same(rival) && listed(rival) };
+    rivals.iter().map(one).collect()
+}
+
+/// A rival as it is told beside a finding of this family.
+pub(super) fn confusable(odds: &Odds, search: &Search, machine: &Machine, family: &Family) -> Confusable {
+    let candidate = &search.candidates[odds.rival.candidate];
+    let told = family.look_alikes.iter().find(|l| l.effect == candidate.effect);
+    let at = candidate.place.name(machine);
+    Confusable {
+        effect: candidate.told_as.clone(),
+        separate_by: told.map_or_else(
+            || match candidate.place {
+                Place::Joint(_) | Place::Pair(..) => {
+                    format!("a path on which {at} moves on its own, to and fro over all of its travel")
+                }
+                Place::Frame(_) | Place::Measurement => {
+                    "the same path again, in another order and at another speed".into()
+                }
+            },
+            |l| l.separate_by.replace("{at}", &at),
+        ),
+        at,
+        probability: odds.probability,
+    }
+}

@@ -1,0 +1,272 @@
+//! From what the search took in to what is said: which names hold, what is unexplained, and all figures.
+
+use super::along::along_travel;
+use super::diagnosis::{Diagnosis, Named, by_model, rms_of};
+use super::finding::{Confusable, Finding, Size};
+use super::folds;
+use super::held_out::Model;
+use super::noise::Noise;
+use super::odds::{Odds, confusable, odds, trust};
+use super::outliers;
+use super::search::{Active, Rival, Search, all_but};
+use super::shares::Shares;
+use super::speeds::levelled;
+use super::stretch::wheres;
+use super::traces::{self, Traces};
+use super::unexplained::{self, Unexplained};
+use super::whereabouts::{standing, whereabouts};
+use crate::effects::{Identified, Library, Place, in_words};
+use crate::feature::Dimension;
+use crate::machine::Machine;
+
+/// What is left may be this part of what geometry leaves over before nothing counts as explained.
+const TOLERATED: f64 = 0.2;
+/// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
+/// leaves fewer independent readings.
+const SURPRISE: f64 = 0.003;
+/// More events of one moment each in one session are no slips: something is loose, or the instrument jumps to and fro.
+const EVENTS: usize = 2;
+/// Structure counts beyond this many standard deviations of chance.
+const CHANCE: f64 = 5.0;
+/// The same for functions of where a joint stands: chance alone does so in one of some hundred recordings of settled positions.
+const ALONG: f64 = 4.5;
+/// Logarithm of the evidence at which a series (69) is structure: there are some hundred of them.
+const STANDING: f64 = 12.0;
+/// Where shapes make up less than this part of all, the names are no patches, whatever surprises.
+const ODD_SHAPE: f64 = 0.05;
+/// A common effect of which the shape is less than this part of all is what it looks like.
+const PLAIN: f64 = 0.01;
+/// Names whose odds are no less than this part of the best one's cannot be told from it.
+const ALIAS: f64 = 1.0 / 3.0;
+/// Logarithm of the odds at which a finding is told.
+const TOLD: f64 = 5.0;
+/// What is no more likely than this is no name.
+const LIKELY: f64 = 0.5;
+
+/// Residuals with the effects taken away, m and rad.
+pub(super) fn residual_of(search: &Search, active: &[Active]) -> Vec<f64> {
+    Model::new(search, active).residual(search, active)
+}
+
+/// Everything that is said of the effects that the search took in.
+pub(super) fn report(
+    search: &Search,
+    active: &[Active],
+    machine: &Machine,
+    library: &Library,
+    noise: &[Noise],
+) -> Diagnosis {
+    let linear = search.rows.linear;
+    let shares = search.shares(active);
+    let mut doubt = doubt(search, active, machine, &shares, noise);
+    let mut told: Vec<(usize, Finding, Named)> = match doubt {
+        Some(_) => Vec::new(),
+        None => {
+            let model = Model::new(search, active);
+            let one = |i| finding(search, active, i, &shares, (machine, library), &model);
+            (0..active.len()).filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
+        }
+    };
+    let likely = told.iter().filter(|(_, finding, _)| finding.probability > LIKELY).count();
+    if likely < told.len() {
+        let unlikely = told.iter().filter(|(_, finding, _)| finding.probability <= LIKELY);
+        doubt = unlikely.max_by(|a, b| active[a.0].score.gain.total_cmp(&active[b.0].score.gain)).map(
+            |(i, ..)| Doubt {
+                place: Some(search.candidates[active[*i].candidate].place),
+                energy: 2.0 * active[*i].score.gain,
+            },
+        );
+        // Of a patchwork no piece is a name.
+        let patchwork = told.len() - likely > likely;
+        told.retain(|(_, finding, _)| !patchwork && finding.probability > LIKELY);
+    }
+    let unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
+    let kept: Vec<Active> = told.iter().map(|(i, ..)| active[*i].clone()).collect();
+    let left_over = residual_of(search, &kept);
+    let (findings, named): (Vec<Finding>, Vec<Named>) =
+        told.into_iter().map(|(_, finding, named)| (finding, named)).unzip();
+    let mut diagnosis = Diagnosis {
+        machine: machine.name().into(),
+        recordings: linear.spans.iter().map(|s| s.label.clone()).collect(),
+        samples: linear.lines.len() as u64,
+        noise_floor_m: noise_of(search, noise, false),
+        noise_floor_rad: noise_of(search, noise, true),
+        rms_m: by_model(linear.fit.rms_m, rms_of(search, &left_over, false)),
+        rms_rad: by_model(linear.fit.rms_rad, rms_of(search, &left_over, true)),
+        held_out_rms_m: None,
+        held_out_rms_rad: None,
+        shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
+        findings,
+        unexplained,
+        named,
+        not_tried: Vec::new(),
+        dropped: linear.fit.dropped,
+        outliers: Vec::new(),
+        rms_without_outliers_m: None,
+        rms_without_outliers_rad: None,
+        traces: Traces::default(),
+        location_errors: linear.fit.location_errors.clone(),
+    };
+    outliers::fill(search, &residual_of(search, &[]), &left_over, &mut diagnosis);
+    folds::fill(search, &kept, &mut diagnosis);
+    traces::fill(search, &kept, &left_over, machine, &mut diagnosis);
+    diagnosis
+}
+
+/// Structure without a name: where, if that is known, and its energy in units of the noise's variance.
+struct Doubt {
+    place: Option<Place>,
+    energy: f64,
+}
+
+/// Why the names that were taken in do not explain what is there, if they do not.
+fn doubt(
+    search: &Search,
+    active: &[Active],
+    machine: &Machine,
+    shares: &Shares,
+    noise: &[Noise],
+) -> Option<Doubt> {
+    let (left, total) = (&shares.left, shares.total());
+    let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
+    let memory = noise.iter().map(Noise::memory).fold(1.0, f64::max);
+    let patched = search.patched(active);
+    // What sounds does so louder and softer, and hardly ever at quite one frequency.
+    let wanders = active.iter().any(|effect| search.is_tone(effect.candidate));
+    let is_unexplained = patched.is_some()
+        || left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
+        || left.beyond > CHANCE && search.in_motion && active.len() >= search.most()
+        || active.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
+        || shares.is_misshapen(active.len())
+        || search.in_motion && !wanders && shares.is_unlike()
+        || shares.shapes > ODD_SHAPE * total
+            && surprise > CHANCE * left.heat.max(1.0) * deviation
+            && surprise > SURPRISE * memory * total;
+    if is_unexplained {
+        let energy = search.leftover(&search.base).energy.max(left.energy);
+        return Some(Doubt { place: patched, energy });
+    }
+    if search.in_motion {
+        return None;
+    }
+    // Settled positions show no course, but they may show a function of where a joint stands, or of something else that is known.
+    let is_much = |energy: f64| energy > TOLERATED * (total + energy);
+    let beside = search.beside(active, None);
+    let along = along_travel(search, machine, &beside)
+        .filter(|along| along.beyond > ALONG * search.heat && is_much(along.energy))
+        .map(|along| Doubt { place: Some(Place::Joint(along.joint)), energy: along.energy });
+    along.or_else(|| {
+        standing(search, machine, beside)
+            .filter(|series| series.evidence > STANDING && is_much(2.0 * series.gain))
+            .map(|series| Doubt { place: Some(series.place), energy: 2.0 * series.gain })
+    })
+}
+
+/// What is said of effect `i`; nothing where its rivals leave too little evidence.
+fn finding(
+    search: &Search,
+    active: &[Active],
+    i: usize,
+    shares: &Shares,
+    (machine, library): (&Machine, &Library),
+    model: &Model,
+) -> Option<(Finding, Named)> {
+    let (left, total, effect) = (&shares.left, shares.total(), &active[i]);
+    let rivals = search.rivals_of(active, i);
+    let others = all_but(active, Some(i));
+    let fit = |r: &&Rival| r.candidate == effect.candidate || !search.repeats(r, &others);
+    let rivals: Vec<Rival> = rivals.iter().filter(fit).map(|r| search.tempered(r, left.heat)).collect();
+    let own = rivals.iter().find(|r| r.candidate == effect.candidate).filter(|r| r.weight > TOLD).cloned()?;
+    let is_plain = search.commonness[own.candidate] == 0.0 && shares.shapes < PLAIN * total;
+    // A shape that is little beside all may be much beside this one.
+    let in_shape = shares.shapes < PLAIN * 2.0 * own.score.gain;
+    let rivals = if in_shape { rivals } else { levelled(search, &own, rivals) };
+    let odds = odds(search, &rivals, &own, left.heat.max(search.heat), is_plain);
+    let own_odds = odds.iter().find(|o| o.rival.candidate == own.candidate).map_or(0.0, |o| o.probability);
+    let is_alike =
+        |o: &&Odds| o.probability >= ALIAS * own_odds || search.is_form(o.rival.candidate, own.candidate);
+    let alike = odds.iter().filter(is_alike).map(|o| o.probability);
+    let probability = alike.sum::<f64>().min(1.0) * trust(shares.shapes / total, 2.0 * own.weight);
+    let candidate = &search.candidates[effect.candidate];
+    let family = &library.families()[candidate.family];
+    let mut solved = model.effect(search, active, i, (shares.shapes / total).sqrt());
+    let mut parameters = effect.score.parameters.clone();
+    let jumps = |p: &usize| !candidate.parameters[*p].smooth && !candidate.parameters[*p].whole;
+    for p in (0..parameters.len()).filter(jumps) {
+        let Some((middle, deviation)) = Model::jumping(search, active, i, p) else { continue };
+        parameters[p] = middle;
+        let own = solved.coefficients.len() + p;
+        solved.covariance[own][own] = deviation * deviation;
+    }
+    let identified = Identified {
+        family,
+        candidate,
+        coefficients: solved.coefficients,
+        parameters,
+        covariance: Some(solved.covariance),
+    };
+    let sizes = identified.sizes(&search.rows.linear.samples);
+    let named = Named {
+        effect: identified.stored(machine, &sizes),
+        scales: (search.rows.units(candidate, &effect.score.parameters).iter())
+            .map(|u| effect.score.room * u)
+            .collect(),
+    };
+    let mut confusable_with: Vec<Confusable> = Vec::new();
+    for o in odds.iter().filter(|o| o.is_listed) {
+        let other = confusable(o, search, machine, family);
+        match confusable_with.iter_mut().find(|c| (&c.effect, &c.at) == (&other.effect, &other.at)) {
+            Some(known) => known.probability += other.probability,
+            None => confusable_with.push(other),
+        }
+    }
+    let finding = Finding {
+        effect: candidate.told_as.clone(),
+        form: (candidate.told_as != candidate.effect).then(|| candidate.effect.clone()),
+        at: candidate.place.name(machine),
+        explanation: identified.sentence(machine, &sizes),
+        coefficients: sizes
+            .into_iter()
+            .map(|s| Size {
+                name: s.name,
+                value: s.value,
+                unit: s.unit,
+                std_error: s.std_error.unwrap_or(f64::NAN),
+            })
+            .collect(),
+        probability,
+        delta_bic: 2.0 * own.weight,
+        held_out_rms_m: None,
+        held_out_rms_rad: None,
+        r#where: wheres(search, &|row| effect.columns.row(row).norm_squared()),
+        confusable_with,
+        share: 0.0,
+    };
+    Some((finding, named))
+}
+
+/// What is said of structure without a name.
+fn unexplained(search: &Search, machine: &Machine, noise: &[Noise], doubt: &Doubt) -> Unexplained {
+    let left_by_geometry = search.base.apply(&search.rows.residual);
+    let at = doubt.place.unwrap_or_else(|| whereabouts(search, machine)).name(machine);
+    let length = noise_of(search, noise, false);
+    let sigma = length.or(noise_of(search, noise, true)).unwrap_or(1.0);
+    let rms_m = sigma * (doubt.energy / search.rows.whitener.count().max(1) as f64).sqrt();
+    let size = match length {
+        Some(_) => format!("{:.2} um", 1e6 * rms_m),
+        None => in_words(rms_m, None, Dimension::ANGLE, None),
+    };
+    let (r#where, gathers) = unexplained::gathered(search, machine, left_by_geometry.as_slice());
+    let mut explanation =
+        format!("structure of {size} is left that no named effect explains; it fits best at {at}");
+    for gathering in &gathers {
+        explanation += &format!("; {}", gathering.in_words());
+    }
+    Unexplained { rms_m, at, r#where, gathers, explanation }
+}
+
+/// Standard deviation of the noise of lengths (m) or angles (rad), where such were read.
+fn noise_of(search: &Search, noise: &[Noise], angle: bool) -> Option<f64> {
+    let is_of = |run: &[usize]| run.first().is_some_and(|row| search.rows.linear.angle[*row] == angle);
+    search.runs.iter().zip(noise).find(|(run, _)| is_of(run)).map(|(_, noise)| noise.sigma)
+}

@@ -1,0 +1,237 @@
+//! Where structure without a name sits: which joint, frame or reading foretells most of it, whatever the law.
+//!
+//! Each place is asked with motions that it can make, times functions of what it knows: where the joint stands, the way it goes, how fast,
+//! the time. By their evidence they compete with each other and with the named effects that came nearest, `docs/diagnosis.md` (69).
+
+use std::f64::consts::PI;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::evidence::{Worth, evidence};
+use super::score::{Rows, judge};
+use super::search::Search;
+use super::space::Space;
+use crate::effects::{Place, Slot};
+use crate::feature::{JointSamples, Samples};
+use crate::lie::Twist;
+use crate::machine::{Joint, JointKind, Machine};
+
+/// Orders of the series along a joint's travel for its own motion, and for what its guideway or bearing does.
+const FINE: usize = 40;
+const COARSE: usize = 6;
+/// The same where it depends on another joint as well.
+const CROSSED: usize = 4;
+/// Orders over time.
+const COURSE: usize = 12;
+/// Travel after a reversal over which something decays, as parts of the range.
+const DECAYS: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
+/// Usual sizes of errors, m and rad.
+const USUAL: (f64, f64) = (3e-6, 3e-5);
+/// What no place foretells by at least this part is the instrument's, or the time's.
+const FORETOLD: f64 = 0.1;
+
+/// A way in which a place can move.
+type Motion = (Slot, Twist<f64>);
+
+/// Motions at one place, times one series of curves.
+struct Series {
+    place: Place,
+    motions: Vec<Motion>,
+    curves: Vec<Vec<f64>>,
+}
+
+/// A series that stands out.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Standing {
+    pub place: Place,
+    /// Logarithm of its evidence.
+    pub evidence: f64,
+    /// Half the energy that it takes away.
+    pub gain: f64,
+}
+
+/// The place that most of what geometry leaves over depends on.
+pub(super) fn whereabouts(search: &Search, machine: &Machine) -> Place {
+    let series = standing(search, machine, search.base.clone());
+    let rivals = search.rivals(&[]);
+    let named = rivals.first().map(|r| Standing {
+        place: search.candidates[r.candidate].place,
+        evidence: r.weight,
+        gain: r.reach,
+    });
+    let best = series.into_iter().chain(named).max_by(|a, b| a.evidence.total_cmp(&b.evidence));
+    let energy = search.leftover(&search.base).energy;
+    best.filter(|best| 2.0 * best.gain > FORETOLD * energy).map_or(Place::Measurement, |best| best.place)
+}
+
+/// The series of most evidence beside a space.
+pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Option<Standing> {
+    let (rows, heat) = (search.rows, search.heat);
+    let field = rows.field(space);
+    let one = |series: &Series| {
+        let mut columns = series.columns(rows);
+        rows.whiten(&mut columns);
+        let mut standing = None;
+        let count = columns.ncols();
+        judge(&columns.columns(0, count), &field.space, &field.left, &[0], &mut |_, gram, g| {
+            let Worth { evidence, gain, .. } = evidence(gram, g, count, heat);
+            standing = Some(Standing { place: series.place, evidence, gain });
+        });
+        standing
+    };
+    let all: Vec<Standing> = all(search, machine).par_iter().filter_map(one).collect();
+    all.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+}
+
+impl Series {
+    /// One column for each motion and curve, times the size usual on machines.
+    fn columns(&self, rows: &Rows) -> DMatrix<f64> {
+        let linear = rows.linear;
+        let mut columns = DMatrix::zeros(linear.residual.len(), self.motions.len() * self.curves.len());
+        for (m, (slot, direction)) in self.motions.iter().enumerate() {
+            let answer = rows.answer(*slot, *direction);
+            let turns = direction.to_array()[3..].iter().any(|w| *w != 0.0);
+            let size = if turns { USUAL.1 } else { USUAL.0 };
+            for (c, curve) in self.curves.iter().enumerate() {
+                let mut column = columns.column_mut(m * self.curves.len() + c);
+                for (row, sample) in linear.sample.iter().enumerate() {
+                    column[row] = size * answer[row] * curve[*sample];
+                }
+            }
+        }
+        columns
+    }
+}
+
+/// Every series of every place.
+fn all(search: &Search, machine: &Machine) -> Vec<Series> {
+    let samples = &search.rows.linear.samples;
+    let courses: Vec<Course> =
+        machine.joints().filter_map(|(j, joint)| Course::of(samples, j, joint)).collect();
+    let mut all: Vec<Series> = courses.iter().flat_map(Course::series).collect();
+    for one in &courses {
+        for other in courses.iter().filter(|other| other.joint != one.joint) {
+            let (own, others) = (series(&one.along, 1, CROSSED), series(&other.along, 1, CROSSED));
+            let curves = own.iter().flat_map(|a| others.iter().map(|b| product(a, b))).collect();
+            all.push(Series { place: Place::Joint(one.joint), motions: vec![one.own()], curves });
+        }
+    }
+    all.extend(over_time(search));
+    all
+}
+
+/// The way of one joint through all recordings.
+struct Course<'a> {
+    joint: usize,
+    kind: JointKind,
+    twist: Twist<f64>,
+    /// Where it stands, over the range that it goes, from 0 to 1.
+    along: Vec<f64>,
+    range: f64,
+    samples: &'a [Samples],
+}
+
+impl<'a> Course<'a> {
+    /// `None` where it does not move, or a recording does not tell.
+    fn of(samples: &'a [Samples], joint: usize, of: &Joint) -> Option<Self> {
+        let known = samples.iter().all(|s| s.joints[joint].is_some());
+        let mut course =
+            Course { joint, kind: of.kind, twist: of.twist(), along: Vec::new(), range: 0.0, samples };
+        (course.along, course.range) = over_range(&course.column(|c| &c.position)).filter(|_| known)?;
+        Some(course)
+    }
+
+    fn column(&self, pick: impl Fn(&JointSamples) -> &Vec<f64>) -> Vec<f64> {
+        self.samples.iter().filter_map(|s| s.joints[self.joint].as_ref()).flat_map(pick).copied().collect()
+    }
+
+    /// Its own motion.
+    fn own(&self) -> Motion {
+        (Slot::Before(self.joint), self.twist)
+    }
+
+    /// What depends on this joint alone: its own motion by position, by side and by rates; what its bearing or guideway does by
+    /// position and by side.
+    fn series(&self) -> Vec<Series> {
+        let slot = match self.kind {
+            JointKind::Revolute => Slot::Before(self.joint),
+            JointKind::Prismatic => Slot::After(self.joint),
+        };
+        let unit = |k: usize| Twist::from_array(std::array::from_fn(|i| f64::from(u8::from(i == k))));
+        let (own, six) = (vec![self.own()], (0..6).map(|k| (slot, unit(k))).collect::<Vec<Motion>>());
+        let direction = self.column(|c| &c.direction);
+        let since = self.column(|c| &c.since_reversal);
+        let mut sides: Vec<Vec<f64>> =
+            series(&self.along, 0, COARSE).iter().map(|curve| product(curve, &direction)).collect();
+        sides.extend(DECAYS.map(|part| {
+            let decay = since.iter().map(|s| (-s / (part * self.range)).max(-200.0).exp());
+            decay.zip(&direction).map(|(decay, d)| decay * d).collect()
+        }));
+        let rates = [self.column(|c| &c.velocity), self.column(|c| &c.acceleration)];
+        let rates = rates.iter().filter_map(|rate| over_largest(rate));
+        let mut motion = series(&self.along, 1, COARSE);
+        if self.kind == JointKind::Revolute {
+            for turns in [1.0, 2.0, 3.0] {
+                let angle = self.column(|c| &c.position).into_iter().map(|q| turns * q);
+                let (sine, cosine) = angle.map(f64::sin_cos).unzip();
+                motion.extend([sine, cosine]);
+            }
+        }
+        let all = [
+            (own.clone(), series(&self.along, 1, FINE)),
+            (own.clone(), sides),
+            (own, rates.flat_map(|r| [product(&r, &r), r]).collect()),
+            (six.clone(), motion),
+            (six, vec![product(&direction, &self.along), direction]),
+        ];
+        let place = Place::Joint(self.joint);
+        let all = all.into_iter().filter(|(_, curves)| !curves.is_empty());
+        all.map(|(motions, curves)| Series { place, motions, curves }).collect()
+    }
+}
+
+/// What frames and readings do over time, as candidates say that they can.
+fn over_time(search: &Search) -> Vec<Series> {
+    let times: Option<Vec<Vec<f64>>> = search.rows.linear.samples.iter().map(|s| s.time.clone()).collect();
+    let Some((clock, _)) = times.and_then(|times| over_range(&times.concat())) else { return Vec::new() };
+    let mut all: Vec<Series> = Vec::new();
+    let is_still = |place: Place| matches!(place, Place::Frame(_) | Place::Measurement);
+    for candidate in search.candidates.iter().filter(|c| is_still(c.place)) {
+        let at = all.iter().position(|series| series.place == candidate.place).unwrap_or_else(|| {
+            let orders = if candidate.place == Place::Measurement { FINE } else { COURSE };
+            let curves = series(&clock, 1, orders);
+            all.push(Series { place: candidate.place, motions: Vec::new(), curves });
+            all.len() - 1
+        });
+        for part in candidate.coefficients.iter().flat_map(|c| &c.parts) {
+            let motion = (part.slot, part.direction);
+            if !all[at].motions.contains(&motion) {
+                all[at].motions.push(motion);
+            }
+        }
+    }
+    all
+}
+
+/// `cos nπx` of what runs from 0 to 1, for these orders: any smooth function.
+fn series(x: &[f64], from: usize, to: usize) -> Vec<Vec<f64>> {
+    (from..=to).map(|n| x.iter().map(|x| (n as f64 * PI * x).cos()).collect()).collect()
+}
+
+/// From 0 to 1 over what there is, and how much that is; `None` where it stands still.
+fn over_range(x: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let low = x.iter().copied().fold(f64::INFINITY, f64::min);
+    let range = x.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
+    (range > 1e-9).then(|| (x.iter().map(|x| (x - low) / range).collect(), range))
+}
+
+/// From -1 to 1; `None` where it is nothing throughout.
+fn over_largest(x: &[f64]) -> Option<Vec<f64>> {
+    let most = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    (most > 1e-12 && most.is_finite()).then(|| x.iter().map(|x| x / most).collect())
+}
+
+fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a * b).collect()
+}
