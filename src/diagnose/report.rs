@@ -40,7 +40,7 @@ const PLAIN: f64 = 0.01;
 const ALIAS: f64 = 1.0 / 3.0;
 /// Logarithm of the odds at which a finding is told.
 const TOLD: f64 = 5.0;
-/// What is no more likely than this is no name.
+/// Along a path, what is no more likely than this is no name. Of settled positions, names are told only where they foretell others.
 const LIKELY: f64 = 0.5;
 
 /// Residuals with the effects taken away, m and rad.
@@ -67,9 +67,10 @@ pub(super) fn report(
             (0..active.len()).filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
         }
     };
-    let likely = told.iter().filter(|(_, finding, _)| finding.probability > LIKELY).count();
+    let holds = |finding: &Finding| !search.in_motion || finding.probability > LIKELY;
+    let likely = told.iter().filter(|(_, finding, _)| holds(finding)).count();
     if likely < told.len() {
-        let unlikely = told.iter().filter(|(_, finding, _)| finding.probability <= LIKELY);
+        let unlikely = told.iter().filter(|(_, finding, _)| !holds(finding));
         doubt = unlikely.max_by(|a, b| active[a.0].score.gain.total_cmp(&active[b.0].score.gain)).map(
             |(i, ..)| Doubt {
                 place: Some(search.candidates[active[*i].candidate].place),
@@ -78,7 +79,7 @@ pub(super) fn report(
         );
         // Of a patchwork no piece is a name.
         let patchwork = told.len() - likely > likely;
-        told.retain(|(_, finding, _)| !patchwork && finding.probability > LIKELY);
+        told.retain(|(_, finding, _)| !patchwork && holds(finding));
     }
     let unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
     let kept: Vec<Active> = told.iter().map(|(i, ..)| active[*i].clone()).collect();
