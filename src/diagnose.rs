@@ -9,6 +9,7 @@ mod bent;
 mod blocks;
 mod coarse;
 mod contained;
+mod curves;
 mod diagnosis;
 mod evidence;
 mod finding;

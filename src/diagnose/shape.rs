@@ -5,6 +5,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::curves::{column, product};
 use super::score::Rows;
 use super::search::Active;
 use super::space::gram;
@@ -257,15 +258,6 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64
     curves
 }
 
-fn column(
-    stretches: &[Samples],
-    j: usize,
-    pick: impl Fn(&crate::feature::JointSamples) -> &Vec<f64>,
-) -> Vec<f64> {
-    let one = |s: &Samples| s.joints[j].as_ref().map(|c| pick(c).clone()).unwrap_or_default();
-    stretches.iter().flat_map(one).collect()
-}
-
 fn extent(x: &[f64]) -> f64 {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     (high - low).max(1e-12)
@@ -289,10 +281,6 @@ fn power(x: &[f64], n: i32) -> Vec<f64> {
 
 fn absolute(x: &[f64]) -> Vec<f64> {
     x.iter().map(|x| x.abs()).collect()
-}
-
-fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a * b).collect()
 }
 
 fn chebyshev(n: usize, x: &[f64]) -> Vec<f64> {

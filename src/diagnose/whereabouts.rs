@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::curves::{column, product};
 use super::evidence::{Worth, evidence};
 use super::score::{Rows, judge};
 use super::search::Search;
@@ -143,7 +144,7 @@ impl<'a> Course<'a> {
     }
 
     fn column(&self, pick: impl Fn(&JointSamples) -> &Vec<f64>) -> Vec<f64> {
-        self.samples.iter().filter_map(|s| s.joints[self.joint].as_ref()).flat_map(pick).copied().collect()
+        column(self.samples, self.joint, pick)
     }
 
     /// Its own motion.
@@ -230,8 +231,4 @@ fn over_range(x: &[f64]) -> Option<(Vec<f64>, f64)> {
 fn over_largest(x: &[f64]) -> Option<Vec<f64>> {
     let most = x.iter().fold(0.0f64, |most, x| most.max(x.abs()));
     (most > 1e-12 && most.is_finite()).then(|| x.iter().map(|x| x / most).collect())
-}
-
-fn product(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a * b).collect()
 }
