@@ -6,12 +6,43 @@ use std::f64::consts::TAU;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-/// `Σ_i w_i exp(i κ x_i)` as a function of `κ`, for `|κ|` up to a largest value, of two columns of weights.
+/// Absolute values squared of `Σ_i w_i exp(i κ x_i)` at each of these `κ`, of two columns of weights; `None` where there is no extent.
 ///
-/// The weights are shared out over an even grid of positions, four or more to the shortest period, and transformed; between the
-/// frequencies of the transform the nearest is taken, of which there are eight to the width of a line. Two real columns make one
-/// complex one.
-pub(super) struct Spectrum {
+/// Frequencies are taken band by band, each shifted to nought: a grid of positions fine enough for the highest one would be too long.
+pub(super) fn powers(x: &[f64], weights: [&[f64]; 2], kappas: &[f64]) -> Option<Vec<[f64; 2]>> {
+    let (from, to) =
+        x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    let extent = to - from;
+    let largest = kappas.iter().fold(0.0, |most: f64, kappa| most.max(kappa.abs()));
+    if !(extent > 0.0 && extent.is_finite() && largest > 0.0 && largest.is_finite()) {
+        return None;
+    }
+    let half = largest.min(WIDEST * TAU / extent);
+    let band_of = |kappa: f64| (0.5 * (kappa.abs() / half + 1.0)) as usize;
+    let mut order: Vec<usize> = (0..kappas.len()).collect();
+    order.sort_by_key(|i| band_of(kappas[*i]));
+    let mut powers = vec![[0.0; 2]; kappas.len()];
+    for own in order.chunk_by(|a, b| band_of(kappas[*a]) == band_of(kappas[*b])) {
+        let middle = 2.0 * half * band_of(kappas[own[0]]) as f64;
+        let above = Band::new(x, (from, extent), weights, middle, half);
+        let below = (middle > 0.0).then(|| Band::new(x, (from, extent), weights, -middle, half));
+        for i in own {
+            let kappa = kappas[*i].abs();
+            // Of a real column, what stands at the opposite frequency is the conjugate.
+            let here = above.at(kappa);
+            let mirrored = below.as_ref().unwrap_or(&above).at(-kappa).conj();
+            powers[*i] = [here + mirrored, here - mirrored].map(|twice| 0.25 * twice.norm_sqr());
+        }
+    }
+    Some(powers)
+}
+
+/// The sums about one frequency, up to phases that all columns share.
+///
+/// The weights are shared out over an even grid of positions, four to the shortest period, and transformed; between the frequencies of
+/// the transform the nearest is taken, of which there are eight to the width of a line. Two real columns make one complex one.
+struct Band {
+    middle: f64,
     both: Vec<Complex<f64>>,
     /// Between neighbouring frequencies of the transform, rad per unit of `x`.
     step: f64,
@@ -19,8 +50,8 @@ pub(super) struct Spectrum {
     cell: f64,
 }
 
-/// A longer transform is not made.
-const LONGEST: usize = 1 << 22;
+/// Lines in half a band.
+const WIDEST: f64 = 8192.0;
 /// Frequencies to the width of a line.
 const PADDED: usize = 8;
 
@@ -29,19 +60,9 @@ thread_local! {
     static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
 }
 
-impl Spectrum {
-    /// `None` where the grid would be too long or there is no extent.
-    pub fn new(x: &[f64], weights: [&[f64]; 2], largest: f64) -> Option<Spectrum> {
-        let (from, to) =
-            x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
-        let extent = to - from;
-        if !(extent > 0.0 && extent.is_finite() && largest > 0.0) {
-            return None;
-        }
-        let cells = (4.0 * extent * largest / TAU).ceil() + 2.0;
-        if cells.is_nan() || cells * PADDED as f64 >= LONGEST as f64 {
-            return None;
-        }
+impl Band {
+    fn new(x: &[f64], (from, extent): (f64, f64), weights: [&[f64]; 2], middle: f64, half: f64) -> Self {
+        let cells = (4.0 * extent * half / TAU).ceil() + 2.0;
         let cell = extent / (cells - 2.0);
         let length = fast(PADDED * cells as usize);
         let mut both = vec![Complex::new(0.0, 0.0); length];
@@ -49,24 +70,25 @@ impl Spectrum {
         for (x, (a, b)) in x.iter().zip(first.iter().zip(second)) {
             let at = (x - from) / cell;
             let (index, part) = (at as usize, at.fract());
-            let weight = Complex::new(*a, *b);
+            let mut weight = Complex::new(*a, *b);
+            if middle != 0.0 {
+                weight *= Complex::cis(-middle * (x - from));
+            }
             both[index] += weight * (1.0 - part);
             both[index + 1] += weight * part;
         }
         PLANNER.with_borrow_mut(|planner| planner.plan_fft_forward(length)).process(&mut both);
-        Some(Spectrum { step: TAU / (length as f64 * cell), both, cell })
+        Band { middle, step: TAU / (length as f64 * cell), both, cell }
     }
 
-    /// Absolute values squared of both sums at `κ`.
-    pub fn powers(&self, kappa: f64) -> [f64; 2] {
-        let index = (kappa.abs() / self.step).round() as usize;
-        let Some(here) = self.both.get(index) else { return [0.0; 2] };
-        // Of a real column, what stands at the opposite frequency is the conjugate.
-        let mirrored = self.both[(self.both.len() - index) % self.both.len()].conj();
+    fn at(&self, kappa: f64) -> Complex<f64> {
+        let off = kappa - self.middle;
+        let index = (off.abs() / self.step).round() as usize % self.both.len();
+        let index = if off < 0.0 { (self.both.len() - index) % self.both.len() } else { index };
         // Sharing a weight out between two cells dampens short periods.
-        let half = 0.5 * kappa * self.cell;
+        let half = 0.5 * off * self.cell;
         let sinc = if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
-        [here + mirrored, here - mirrored].map(|twice| 0.25 * twice.norm_sqr() / sinc.powi(4))
+        self.both[index] / (sinc * sinc)
     }
 }
 
@@ -85,7 +107,6 @@ mod tests {
         let x: Vec<f64> = (0..700).map(|i| 3.0 + i as f64 * 0.01 + 0.004 * (i as f64).sin()).collect();
         let first: Vec<f64> = x.iter().map(|x| (17.3 * x).sin() + 0.2 * (40.0 * x).cos()).collect();
         let second: Vec<f64> = x.iter().map(|x| (25.0 * x + 0.3).sin()).collect();
-        let spectrum = Spectrum::new(&x, [&first, &second], 60.0).expect("an extent");
         let direct = |w: &[f64], kappa: f64| {
             let (s, c) = x
                 .iter()
@@ -94,11 +115,30 @@ mod tests {
             s * s + c * c
         };
         let largest = direct(&first, 17.3);
-        for kappa in [5.0, 17.3, 17.5, 25.0, 40.0, 58.0] {
-            for (found, w) in spectrum.powers(kappa).into_iter().zip([&first, &second]) {
+        let kappas = [5.0, 17.3, 17.5, 25.0, 40.0, 58.0];
+        let powers = powers(&x, [&first, &second], &kappas).expect("an extent");
+        for (kappa, powers) in kappas.into_iter().zip(powers) {
+            for (found, w) in powers.into_iter().zip([&first, &second]) {
                 let exact = direct(w, kappa);
                 assert!((found - exact).abs() < 0.1 * exact + 2e-3 * largest, "{kappa}: {found} {exact}");
             }
+        }
+    }
+
+    #[test]
+    fn bands_see_what_one_grid_would_be_too_long_for() {
+        let x: Vec<f64> =
+            (0..3000).map(|i| 0.35 * f64::from(i % 2999) / 2999.0 + 1e-5 * (f64::from(i)).sin()).collect();
+        let lines: [f64; 3] = [1_234.5, 567_890.1, 1_400_000.7];
+        let noise: Vec<f64> = x.iter().map(|x| (7.1e5 * x * x).sin()).collect();
+        for line in lines {
+            let wave: Vec<f64> = x.iter().map(|x| (line * x + 0.4).sin()).collect();
+            let exact: f64 = x.iter().zip(&wave).map(|(x, w)| w * (line * x).sin()).sum::<f64>().powi(2)
+                + x.iter().zip(&wave).map(|(x, w)| w * (line * x).cos()).sum::<f64>().powi(2);
+            let kappas = [300.0, line, 1.5e6];
+            let found = powers(&x, [&noise, &wave], &kappas).expect("an extent");
+            assert!((found[1][1] / exact - 1.0).abs() < 0.1, "{line}: {} {exact}", found[1][1]);
+            assert!(found[1][0] < 0.05 * exact && found[0][1] < 0.05 * exact && found[2][1] < 0.05 * exact);
         }
     }
 }

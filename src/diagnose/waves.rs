@@ -1,7 +1,7 @@
 //! Candidates that are sines and cosines of one phase, over their whole grid at once.
 
 use super::score::{Field, Rows};
-use super::spectrum::Spectrum;
+use super::spectrum;
 use crate::effects::{Candidate, Coefficient};
 
 /// Rows on which the energy of waves is judged.
@@ -40,7 +40,6 @@ impl Rows<'_> {
             let factors: Vec<f64> = (candidate.grid.iter())
                 .map(|point| phase.over(&one, point).first().map_or(f64::NAN, |phase| phase / x[reference]))
                 .collect();
-            let largest = factors.iter().fold(0.0, |most: f64, f| most.max(f.abs()));
             let own: Vec<&Coefficient> =
                 candidate.coefficients.iter().filter(|c| c.order == 2 * pair).collect();
             for two in own.chunks(2) {
@@ -60,9 +59,9 @@ impl Rows<'_> {
                 if energies.iter().flatten().all(|energy| *energy <= 0.0) {
                     continue;
                 }
-                let spectrum = Spectrum::new(&x, [&weights[0], &weights[1]], largest)?;
-                for (i, (factor, gain)) in factors.iter().zip(&mut gains).enumerate() {
-                    for (power, energies) in spectrum.powers(*factor).into_iter().zip(&energies) {
+                let powers = spectrum::powers(&x, [&weights[0], &weights[1]], &factors)?;
+                for (i, (powers, gain)) in powers.iter().zip(&mut gains).enumerate() {
+                    for (power, energies) in powers.iter().zip(&energies) {
                         *gain += if energies[i] > 0.0 { power / (0.5 * energies[i]) } else { 0.0 };
                     }
                 }

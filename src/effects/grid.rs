@@ -9,8 +9,8 @@ use crate::machine::JointKind;
 const TAKEN_UP: f64 = 0.3;
 /// Part of a recording at its beginning and its end in which no slip is looked for.
 const EDGE: f64 = 0.05;
-/// More points than this are cut short, evenly: a grid that large is a mistake of the library.
-const MOST_POINTS: usize = 200_000;
+/// More points than this are not tried: waves end at the shortest that are reached in steps that miss none, all others are spread evenly.
+const MOST_POINTS: usize = 1_000_000;
 
 /// A parameter's range at one place, SI; the reason where there is none.
 pub(super) fn range(
@@ -120,20 +120,13 @@ pub(super) fn points(
                 Grid::Parts(parts) => even(from, to, *parts),
                 Grid::Whole => whole(from, to),
                 Grid::Orders(_) if seen >= 0.99 * std::f64::consts::TAU => whole(from, to),
-                Grid::Orders(part) => {
-                    let parts = ((to - from) * seen / std::f64::consts::TAU / part).ceil().max(1.0) as usize;
-                    even(from, to, parts.min(MOST_POINTS))
-                }
+                Grid::Orders(part) => waves(from, to, part * std::f64::consts::TAU / seen),
                 Grid::Periods(part) => {
                     let extent = if forms[i].unit == "s" { facts.longest } else { seen };
                     let (most, least) = (1.0 / from, 1.0 / to);
-                    let parts = ((most - least) * extent / part).ceil().max(1.0) as usize;
-                    even(least, most, parts.min(MOST_POINTS)).into_iter().rev().map(f64::recip).collect()
+                    waves(least, most, part / extent).into_iter().rev().map(f64::recip).collect()
                 }
-                Grid::Frequencies(part) => {
-                    let parts = ((to - from) * facts.followed().max(1e-9) / part).ceil().max(1.0) as usize;
-                    even(from, to, parts.min(MOST_POINTS))
-                }
+                Grid::Frequencies(part) => waves(from, to, part / facts.followed().max(1e-9)),
                 Grid::Within(other, part) => {
                     let width = names.iter().position(|n| n == other).map_or(to - from, |o| point[o]);
                     let parts = ((to - from) / (part * width).abs().max(1e-12)).ceil().max(1.0) as usize;
@@ -161,6 +154,12 @@ fn even(from: f64, to: f64, parts: usize) -> Vec<f64> {
         return vec![from];
     }
     (0..=parts).map(|i| from + (to - from) * i as f64 / parts as f64).collect()
+}
+
+/// Frequencies no further apart than `step`.
+fn waves(from: f64, to: f64, step: f64) -> Vec<f64> {
+    let to = to.min(from + step * MOST_POINTS as f64);
+    even(from, to, ((to - from) / step).ceil().max(1.0) as usize)
 }
 
 /// Numbers of samples inside every recording, away from where it begins and ends: there nothing has a before and an after.
