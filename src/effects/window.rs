@@ -2,14 +2,18 @@
 
 use std::f64::consts::TAU;
 
+use rustfft::num_complex::Complex;
+
 /// Two waves that are this much alike at all positions cannot be told apart.
 const ALIKE: f64 = 0.75;
 /// Waves are tried down to this part of two gaps, where positions lie unevenly enough.
 const FINER: f64 = 0.125;
 /// More distinct positions than this are dense enough for what any family asks.
 const DENSE: usize = 400;
-/// Steps of the window over one width of its peak.
+/// Steps of the window over one width of its peak, and how many at most: what is finer, where positions gather in a few spots, is not
+/// claimed to be told.
 const STEPS: f64 = 8.0;
+const MOST: f64 = 1e6;
 
 /// Shortest period, m or rad, of a wave that no coarser one looks like at these positions, `gap` being what lies between two of them
 /// as a rule.
@@ -26,19 +30,21 @@ pub(super) fn finest(positions: &[f64], gap: f64) -> f64 {
     if places.len() > DENSE || last <= first || gap <= 0.0 {
         return wave;
     }
-    let alike = |frequency: f64| {
-        let turned = places.iter().map(|q| (TAU * frequency * (q - first)).sin_cos());
-        let (sin, cos) = turned.fold((0.0, 0.0), |(s, c), (sin, cos)| (s + sin, c + cos));
-        sin.hypot(cos) > ALIKE * places.len() as f64
-    };
     // Beyond the peak at nothing, up to twice the finest that is asked for.
     let step = 1.0 / (STEPS * (last - first));
     let (from, to) = (1.0 / wave, 2.0 / (FINER * wave));
-    let count = ((to - from) / step).ceil() as usize;
-    match (0..=count).map(|i| from + i as f64 * step).find(|frequency| alike(*frequency)) {
-        Some(frequency) => (2.0 / frequency).min(wave),
-        None => FINER * wave,
+    let count = ((to - from) / step).ceil().min(MOST) as usize;
+    // Of every place, where its wave stands, and by how much it turns from one frequency to the next.
+    let turns = |frequency: f64| move |q: &f64| Complex::cis(TAU * frequency * (q - first));
+    let mut waves: Vec<Complex<f64>> = places.iter().map(turns(from)).collect();
+    let advance: Vec<Complex<f64>> = places.iter().map(turns(step)).collect();
+    for i in 0..=count {
+        if waves.iter().sum::<Complex<f64>>().norm() > ALIKE * places.len() as f64 {
+            return (2.0 / (from + i as f64 * step)).min(wave);
+        }
+        waves.iter_mut().zip(&advance).for_each(|(wave, advance)| *wave *= advance);
     }
+    2.0 / (from + count as f64 * step)
 }
 
 #[cfg(test)]
