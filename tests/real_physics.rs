@@ -7,7 +7,7 @@
 
 mod common;
 
-use common::sets::{Set, axes, hilti, justin, kuka, pandas};
+use common::sets::{Fold, Set, axes, hilti, justin, kuka, pandas};
 use kincal::CalibratedMachine;
 use kincal::effects::{Candidate, Library, RecordingFacts, Slot as EffectSlot};
 use kincal::feature::samples_of;
@@ -15,6 +15,7 @@ use kincal::identify::{Model, Options, calibrate_model, fit_setup};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::variation::{Part, Slot, Term, Varying};
+use rayon::prelude::*;
 
 /// Coefficients may be this many usual sizes large.
 const ROOM: f64 = 30.0;
@@ -128,23 +129,27 @@ fn figures(set: &Set, varying: &Varying, names: &[String]) -> Figures {
         calibrate_model(&set.machine, recordings, &model, Options::default(), &|_| {})
             .unwrap_or_else(|e| panic!("{}: {e}", set.name))
     };
-    let whole = set.whole();
-    let (found, fit) = calibrated(&whole);
-    let (sum, count) = squares(&found, &whole);
+    let whole = || {
+        let whole = set.whole();
+        let (found, fit) = calibrated(&whole);
+        (squares(&found, &whole), fit)
+    };
+    let without = || -> Vec<(f64, u64)> {
+        let one = |fold: Fold| {
+            let (mut learnt, _) = calibrated(&fold.train);
+            if !fold.setup.is_empty() {
+                learnt = fit_setup(&learnt, &fold.setup, Options::default().loss)
+                    .unwrap_or_else(|e| panic!("{e}"));
+            }
+            squares(&learnt, &fold.test)
+        };
+        set.folds().into_par_iter().map(one).collect()
+    };
+    let (((sum, count), fit), folds) = rayon::join(whole, without);
     for (name, c) in names.iter().zip(&fit.coefficients) {
         println!("  {name:<60} {:11.4e} ± {:.1e}", c.value, c.std_error);
     }
-    let (mut left, mut judged) = (0.0, 0);
-    for fold in set.folds() {
-        let (mut learnt, _) = calibrated(&fold.train);
-        if !fold.setup.is_empty() {
-            learnt =
-                fit_setup(&learnt, &fold.setup, Options::default().loss).unwrap_or_else(|e| panic!("{e}"));
-        }
-        let (sum, count) = squares(&learnt, &fold.test);
-        left += sum;
-        judged += count;
-    }
+    let (left, judged) = folds.iter().fold((0.0, 0), |(left, judged), (l, j)| (left + l, judged + j));
     Figures { fitted: (sum / count as f64).sqrt(), left_out: (left / judged as f64).sqrt() }
 }
 

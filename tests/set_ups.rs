@@ -169,6 +169,12 @@ fn ground_that_gives_way_belongs_to_its_set_up_and_is_found_again_in_a_new_one()
     let (known, new) = (&all[..2], &all[2..]);
     let mut said = said(&machine, known);
     assert_eq!(names(&said), [("ground_compliance", "column")]);
+    // What belongs to a set-up is found again in the one that was left out.
+    for one in &said.set_ups_left_out {
+        let rms = one.rms_m.expect("lengths");
+        assert!(rms.r#final < 45e-6 && rms.geometric > 1.5 * rms.r#final, "{one:?}");
+    }
+    assert_eq!(said.set_ups_left_out.len(), 2);
     let model = said.model(&machine, known, Options::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
     let model = CalibratedMachine::parse("ground.ron", &model.to_ron()).unwrap_or_else(|e| panic!("{e}"));
     let found = fit_setup(&model, new, Loss::Squares).unwrap_or_else(|e| panic!("{e}"));
@@ -185,6 +191,32 @@ fn ground_that_gives_way_belongs_to_its_set_up_and_is_found_again_in_a_new_one()
 }
 
 /// Bumps of either sign, drawn for every twentieth of the travel: no family has such a curve, and poses in no order show no course.
+#[test]
+fn what_is_right_holds_in_a_set_up_left_out_and_a_meaningless_cause_does_not() {
+    let machine = common::machine("six_r_arm");
+    let nominal = CalibratedMachine::nominal(machine.clone());
+    let mut random = Random(5);
+    let all = ["left", "right"].map(|place| {
+        let poses = poses(&machine, 90, &mut random);
+        let mut real = poses.clone();
+        // 24 teeth on the second joint.
+        real.iter_mut().for_each(|pose| pose[1] += 3e-4 * (24.0 * pose[1]).sin());
+        let points = read(&nominal, place, place, &real, &mut random);
+        recording(&machine, &format!("{place}.csv"), place, &poses, &points)
+    });
+    let said = said(&machine, &all);
+    assert_eq!(names(&said), [("cyclic_error", machine.commands()[1].as_str())]);
+    let meaningless = said.findings[0].placebo.as_ref().expect("other joints turn as well");
+    assert!(meaningless.share < 0.3, "{meaningless:?}");
+    let setups: Vec<&str> = said.set_ups_left_out.iter().map(|one| one.setup.as_str()).collect();
+    assert_eq!(setups, ["left", "right"]);
+    for one in &said.set_ups_left_out {
+        let rms = one.rms_m.expect("lengths");
+        assert!(rms.r#final < 45e-6 && rms.geometric > 2.0 * rms.r#final, "{one:?}");
+        assert!(rms.placebo.is_some_and(|placebo| placebo > 0.8 * rms.geometric), "{one:?}");
+    }
+}
+
 #[test]
 fn any_other_function_of_where_a_joint_stands_is_unexplained_at_that_joint() {
     let machine = common::machine("six_r_arm");

@@ -6,6 +6,7 @@ use super::finding::Finding;
 use super::not_tried::NotTried;
 use super::outliers::{Outliers, WithoutOutliers};
 use super::search::Search;
+use super::set_ups::SetUpLeftOut;
 use super::traces::Traces;
 use super::unexplained::Unexplained;
 use crate::effects::StoredEffect;
@@ -39,6 +40,9 @@ pub struct Diagnosis {
     /// The same of angles, rad.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out_rms_rad: Option<HeldOutRms>,
+    /// Each set-up left out of the fit in turn, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub set_ups_left_out: Vec<SetUpLeftOut>,
     /// What was found, strongest evidence first.
     pub findings: Vec<Finding>,
     /// What no family explains.
@@ -111,8 +115,14 @@ pub(super) fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<Rm
 
 /// Root mean square over samples of the norm of residual lengths or angles.
 pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
+    let all: Vec<usize> = (0..residual.len()).collect();
+    rms_of_rows(search, residual, angle, &all)
+}
+
+/// The same over these rows.
+pub(super) fn rms_of_rows(search: &Search, residual: &[f64], angle: bool, rows: &[usize]) -> Option<f64> {
     let linear = search.rows.linear;
-    let rows = || (0..residual.len()).filter(|row| linear.angle[*row] == angle);
+    let rows = || rows.iter().copied().filter(|row| linear.angle[*row] == angle);
     let mut samples: Vec<usize> = rows().map(|row| linear.sample[row]).collect();
     samples.dedup();
     let squares: f64 = rows().map(|row| residual[row] * residual[row]).sum();

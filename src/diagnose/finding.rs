@@ -30,6 +30,9 @@ pub struct Finding {
     pub held_out_rms_rad: Option<HeldOutPair>,
     /// Where it acts.
     pub r#where: Vec<Where>,
+    /// What a cause that cannot be one does as well.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub placebo: Option<Meaningless>,
     /// What these recordings cannot tell from it.
     pub confusable_with: Vec<Confusable>,
     /// Part of the mean square that geometry leaves over that goes with it, 0 to 1, the others taken in.
@@ -54,6 +57,15 @@ pub struct Size {
     pub unit: String,
     /// Standard uncertainty.
     pub std_error: f64,
+}
+
+/// The same family at the same place with as many numbers, and a cause that has nothing to do with it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Meaningless {
+    /// The cause, as part of a sentence: of all, the one with which most is explained.
+    pub cause: String,
+    /// What it explains as part of what the finding does.
+    pub share: f64,
 }
 
 /// Another name for the same.

@@ -106,22 +106,15 @@ impl Model {
         let mut coefficients = self.coefficients(search, active, i);
         coefficients.resize(all, 0.0);
         // Derivatives by the parameters join the columns.
+        let weights = DVector::from_fn(k, |c, _| coefficients[c] / units[c].max(1e-300));
+        let by_parameter = search.rows.slopes(candidate, &effect.score.parameters, &units);
         let mut slopes: Vec<(usize, DVector<f64>, f64)> = Vec::new();
         for (p, parameter) in candidate.parameters.iter().enumerate().filter(|(_, p)| p.smooth) {
-            let value = effect.score.parameters[p];
-            let step = 1e-3 * (parameter.range.1 - parameter.range.0).min(value.abs().max(1e-12));
-            let at = |by: f64| {
-                let mut moved = effect.score.parameters.clone();
-                moved[p] += by;
-                let raw = search.rows.raw_with_units(candidate, &moved, &units)?;
-                let weights = DVector::from_fn(k, |c, _| coefficients[c] / units[c].max(1e-300));
-                let sum = raw.columns(0, k) * weights;
-                let mut white = DVector::<f64>::zeros(search.rows.linear.residual.len());
-                search.rows.whitener.apply(sum.as_slice(), white.as_mut_slice());
-                Some(white)
-            };
-            if let (Some(up), Some(down)) = (at(step), at(-step)) {
-                slopes.push((p, (up - down) / (2.0 * step), parameter.range.1 - parameter.range.0));
+            let slope = by_parameter[p].columns(0, k) * &weights;
+            let mut white = DVector::<f64>::zeros(slope.len());
+            search.rows.whitener.apply(slope.as_slice(), white.as_mut_slice());
+            if white.iter().all(|x| x.is_finite()) {
+                slopes.push((p, white, parameter.range.1 - parameter.range.0));
             }
         }
         let mut covariance = vec![vec![0.0; all + parameters]; all + parameters];

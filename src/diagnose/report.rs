@@ -2,13 +2,15 @@
 
 use super::along::along_travel;
 use super::diagnosis::{Diagnosis, Named, by_model, rms_of};
-use super::finding::{Confusable, Finding, Size};
+use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
 use super::held_out::Model;
 use super::noise::Noise;
 use super::odds::{Odds, confusable, odds, trust};
 use super::outliers;
+use super::placebo::{Placebo, placebo};
 use super::search::{Active, Rival, Search, all_but};
+use super::set_ups;
 use super::shares::Shares;
 use super::speeds::levelled;
 use super::stretch::wheres;
@@ -42,6 +44,8 @@ const ALIAS: f64 = 1.0 / 3.0;
 const TOLD: f64 = 5.0;
 /// Along a path, what is no more likely than this is no name. Of settled positions, names are told only where they foretell others.
 const LIKELY: f64 = 0.5;
+/// A name whose cause may be exchanged for a meaningless one, with evidence greater by this logarithm, is none.
+const OUTDONE: f64 = 5.0;
 
 /// Residuals with the effects taken away, m and rad.
 pub(super) fn residual_of(search: &Search, active: &[Active]) -> Vec<f64> {
@@ -67,10 +71,22 @@ pub(super) fn report(
             (0..active.len()).filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
         }
     };
-    let holds = |finding: &Finding| !search.in_motion || finding.probability > LIKELY;
-    let likely = told.iter().filter(|(_, finding, _)| holds(finding)).count();
+    let mut placebos: Vec<Option<Placebo>> =
+        told.iter().map(|(i, ..)| placebo(search, active, *i, machine)).collect();
+    for ((_, finding, _), placebo) in told.iter_mut().zip(&placebos) {
+        finding.placebo = placebo
+            .as_ref()
+            .map(|placebo| Meaningless { cause: placebo.cause.clone(), share: placebo.share });
+    }
+    let outdone: Vec<usize> = (told.iter().zip(&placebos))
+        .filter_map(|((i, ..), placebo)| placebo.as_ref().filter(|p| p.ahead > OUTDONE).map(|_| *i))
+        .collect();
+    let holds = |(i, finding, _): &(usize, Finding, Named)| {
+        !outdone.contains(i) && (!search.in_motion || finding.probability > LIKELY)
+    };
+    let likely = told.iter().filter(|told| holds(told)).count();
     if likely < told.len() {
-        let unlikely = told.iter().filter(|(_, finding, _)| !holds(finding));
+        let unlikely = told.iter().filter(|told| !holds(told));
         doubt = unlikely.max_by(|a, b| active[a.0].score.gain.total_cmp(&active[b.0].score.gain)).map(
             |(i, ..)| Doubt {
                 place: Some(search.candidates[active[*i].candidate].place),
@@ -79,11 +95,13 @@ pub(super) fn report(
         );
         // Of a patchwork no piece is a name.
         let patchwork = told.len() - likely > likely;
-        told.retain(|(_, finding, _)| !patchwork && holds(finding));
+        let both = told.into_iter().zip(placebos).filter(|(told, _)| !patchwork && holds(told));
+        (told, placebos) = both.unzip();
     }
     let unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
     let kept: Vec<Active> = told.iter().map(|(i, ..)| active[*i].clone()).collect();
     let left_over = residual_of(search, &kept);
+    let set_ups_left_out = set_ups::left_out(search, &kept, &placebos);
     let (findings, named): (Vec<Finding>, Vec<Named>) =
         told.into_iter().map(|(_, finding, named)| (finding, named)).unzip();
     let mut diagnosis = Diagnosis {
@@ -96,6 +114,7 @@ pub(super) fn report(
         rms_rad: by_model(linear.fit.rms_rad, rms_of(search, &left_over, true)),
         held_out_rms_m: None,
         held_out_rms_rad: None,
+        set_ups_left_out,
         shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
         findings,
         unexplained,
@@ -240,6 +259,7 @@ fn finding(
         held_out_rms_m: None,
         held_out_rms_rad: None,
         r#where: wheres(search, &|row| effect.columns.row(row).norm_squared()),
+        placebo: None,
         confusable_with,
         share: 0.0,
     };

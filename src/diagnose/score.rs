@@ -149,14 +149,31 @@ impl<'a> Rows<'a> {
         Some(self.columns_of(candidate, &features, &units))
     }
 
-    /// The same, each column times a unit of its own.
-    pub fn raw_with_units(
+    /// The same with the features of other samples, this part of each recording away.
+    pub fn raw_elsewhere(
         &self,
         candidate: &Candidate,
         parameters: &[f64],
-        units: &[f64],
+        part: f64,
     ) -> Option<DMatrix<f64>> {
-        Some(self.columns_of(candidate, &self.features(candidate, parameters)?, units))
+        let mut features = self.features(candidate, parameters)?;
+        let units: Vec<f64> = candidate.coefficients.iter().map(|c| unit_size(c, &features)).collect();
+        for feature in &mut features {
+            for span in &self.linear.spans {
+                let own = &mut feature[span.samples.0..span.samples.1];
+                own.rotate_left((part * own.len() as f64) as usize);
+            }
+        }
+        Some(self.columns_of(candidate, &features, &units))
+    }
+
+    /// Derivatives of its columns by each of its parameters, from dual numbers, each column times a unit of its own; m and rad.
+    pub fn slopes(&self, candidate: &Candidate, parameters: &[f64], units: &[f64]) -> Vec<DMatrix<f64>> {
+        let all: Vec<Vec<Vec<f64>>> = (candidate.features.iter())
+            .map(|feature| feature.with_derivatives(&self.linear.samples, parameters).1)
+            .collect();
+        let by = |p: usize| all.iter().map(|by| by[p].clone()).collect::<Vec<_>>();
+        (0..parameters.len()).map(|p| self.columns_of(candidate, &by(p), units)).collect()
     }
 
     /// Every feature at every sample; `None` if one is not there.
@@ -329,6 +346,21 @@ pub(super) struct Best {
     length: usize,
     gain: f64,
     room: f64,
+}
+
+impl Best {
+    /// As what is told of a candidate of one point.
+    pub fn at(self, parameters: &[f64]) -> Score {
+        Score {
+            evidence: self.evidence,
+            at_best: self.evidence,
+            parameters: parameters.to_vec(),
+            also: Vec::new(),
+            coefficients: self.length,
+            gain: self.gain,
+            room: self.room,
+        }
+    }
 }
 
 /// More columns than this are multiplied by blocks.

@@ -27,6 +27,8 @@ const MOST_SAMPLES: u64 = 40_000;
 pub(crate) struct Span {
     /// File name.
     pub label: String,
+    /// Name of its set-up.
+    pub setup: String,
     /// First row and one behind the last.
     pub rows: (usize, usize),
     /// First sample and one behind the last.
@@ -330,6 +332,7 @@ fn rows(
         linear.samples.push(all.unwrap_or_default());
         linear.spans.push(Span {
             label: source.label.clone(),
+            setup: sources.setups[source.setup].clone(),
             rows: (first, linear.residual.len()),
             samples: (first_sample, linear.lines.len()),
             readings,

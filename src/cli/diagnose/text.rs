@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
-use kincal::diagnose::{Diagnosis, Finding, HeldOutPair, HeldOutRms, RmsByModel, Unexplained, Where};
+use kincal::diagnose::{
+    Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, Unexplained, Where,
+};
 use kincal::effects::in_words;
 use kincal::feature::Dimension;
 
@@ -97,6 +99,7 @@ pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
         }
         lines.push(line);
     }
+    lines.extend(set_ups(diagnosis));
     if diagnosis.dropped > 0 {
         let rows = count(diagnosis.dropped, "row", "rows");
         lines.push(format!("drop-outs: {rows} with a missing number, left out"));
@@ -105,6 +108,27 @@ pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
     lines
 }
 
+/// What is left of every set-up when the others alone say what the machine is like.
+fn set_ups(diagnosis: &Diagnosis) -> Vec<String> {
+    let found = !diagnosis.findings.is_empty();
+    let mut lines = Vec::new();
+    for one in &diagnosis.set_ups_left_out {
+        for (LeftOutRms { geometric, r#final, placebo }, angle) in both(one.rms_m, one.rms_rad) {
+            let mut line = format!("set-up {} left out of the fit: {}", one.setup, amount(geometric, angle));
+            if found {
+                let _ = write!(line, " -> {}", amount(r#final, angle));
+            }
+            if let Some(placebo) = placebo.filter(|_| found) {
+                let _ = write!(line, " ({} with placebos)", amount(placebo, angle));
+            }
+            lines.push(line);
+        }
+    }
+    lines
+}
+
+/// A meaningless cause that explains this part as much is told.
+const TELLING: f64 = 0.3;
 /// Lines of a file that are told one by one.
 const FEW_LINES: usize = 8;
 
@@ -150,6 +174,12 @@ pub(crate) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
             "held-out error: {} without it -> {} with it",
             amount(before, angle),
             amount(after, angle)
+        ));
+    }
+    if let Some(Meaningless { cause, share }) = finding.placebo.as_ref().filter(|p| p.share > TELLING) {
+        lines.push(format!(
+            "placebo: {cause} in place of its own cause would explain {} as much",
+            percent(*share)
         ));
     }
     if let Some(places) = places(&finding.r#where, diagnosis.recordings.len()) {

@@ -1,0 +1,68 @@
+//! What a cause that cannot be one does as well, `docs/diagnosis.md` (70).
+
+use nalgebra::DMatrix;
+
+use super::score::{Score, best, judge, lengths};
+use super::search::{Active, Search};
+use crate::effects::{Candidate, Place};
+use crate::machine::Machine;
+
+/// An effect with as many numbers, where it was found, and a meaningless cause.
+pub(super) struct Placebo {
+    /// What drives it, as part of a sentence.
+    pub cause: String,
+    /// What it takes away as part of what the effect does.
+    pub share: f64,
+    /// By how much its evidence is above the effect's, a logarithm.
+    pub ahead: f64,
+    /// Its columns, m and rad.
+    pub raw: DMatrix<f64>,
+}
+
+/// Weights are taken from poses that are so many of these parts of a recording away.
+const PARTS: usize = 4;
+
+/// The best one for effect `i`: driven by the motion of another joint, searched for over its whole grid as the effect itself was; of
+/// weights, which are different numbers at every joint, those that act in other poses. `None` where there is no such thing.
+pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Machine) -> Option<Placebo> {
+    let (effect, rows) = (&active[i], search.rows);
+    let own = &search.candidates[effect.candidate];
+    let field = rows.field(search.beside(active, Some(i)));
+    let here = rows.score_at(own, &effect.score.parameters, &field, search.heat)?;
+    let weighs = own.features.iter().any(|feature| feature.needs_gravity());
+    let of = |cause: String, score: &Score, raw: &DMatrix<f64>| Placebo {
+        cause,
+        share: score.gain / here.gain.max(f64::MIN_POSITIVE),
+        ahead: score.at_best - here.at_best,
+        raw: raw.columns(0, score.coefficients) * score.room,
+    };
+    let driven = search.candidates.iter().enumerate().filter_map(|(k, other)| {
+        let joint = moved_by(own, other)?;
+        let candidate = Candidate { coefficients: own.coefficients.clone(), ..other.clone() };
+        let score = rows.screen(k, &candidate, &field, search.heat)?;
+        let what = if weighs { "the weight on" } else { "the motion of" };
+        let cause = format!("{what} {}", Place::Joint(joint).name(machine));
+        Some(of(cause, &score, &rows.raw(&candidate, &score.parameters)?))
+    });
+    let elsewhere = (1..if weighs { PARTS } else { 1 }).filter_map(|part| {
+        let raw = rows.raw_elsewhere(own, &effect.score.parameters, part as f64 / PARTS as f64)?;
+        let mut white = raw.clone();
+        rows.whiten(&mut white);
+        let (at, mut score) = (&effect.score.parameters, None);
+        judge(&white.as_view(), &field.space, &field.left, &[0], &mut |_, gram, g| {
+            score = Some(best(own, at, &lengths(own), gram, g, search.heat).at(at));
+        });
+        Some(of("the weights of other poses".into(), &score?, &raw))
+    });
+    driven.chain(elsewhere).max_by(|a, b| a.share.total_cmp(&b.share))
+}
+
+/// The joint that drives the other candidate, where it is the same family at another joint and its features tell the two apart.
+fn moved_by(own: &Candidate, other: &Candidate) -> Option<usize> {
+    let (Place::Joint(j), Place::Joint(k)) = (own.place, other.place) else { return None };
+    let alike = own.family == other.family
+        && own.features.len() == other.features.len()
+        && own.coefficients.len() == other.coefficients.len()
+        && own.parameters.len() == other.parameters.len();
+    (j != k && alike && own.features != other.features).then_some(k)
+}
