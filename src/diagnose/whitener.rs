@@ -11,6 +11,10 @@ pub(super) struct Whitener {
     /// Part of what was new in the row before that is no memory but rounding, times `rho`.
     rounded: Vec<f64>,
     scale: Vec<f64>,
+    /// One over it.
+    unscale: Vec<f64>,
+    /// Whether any row remembers another.
+    remembers: bool,
     /// Rows that are left out.
     pub out: Vec<bool>,
 }
@@ -27,6 +31,8 @@ impl Whitener {
             rho: vec![0.0; rows],
             rounded: vec![0.0; rows],
             scale: vec![0.0; rows],
+            unscale: Vec::new(),
+            remembers: false,
             out,
         };
         for (run, noise) in runs.iter().zip(noise) {
@@ -56,18 +62,24 @@ impl Whitener {
                 last = *row as u32;
             }
         }
+        whitener.unscale = whitener.scale.iter().map(|scale| scale.recip()).collect();
+        whitener.remembers = whitener.previous.iter().any(|before| *before != NONE);
         whitener
     }
 
     /// A column of rows, whitened, (61); rows that are left out become 0.
     pub fn apply(&self, column: &[f64], to: &mut [f64]) {
-        for row in 0..to.len() {
-            let before = self.previous[row] as usize;
-            to[row] = match self.previous[row] {
-                NONE => self.scale[row] * column[row],
-                _ => {
-                    let new = to[before] / self.scale[before];
-                    self.scale[row] * (column[row] - self.rho[row] * column[before] + self.rounded[row] * new)
+        if !self.remembers {
+            return self.plain(column, to);
+        }
+        let memory = self.previous.iter().zip(&self.rho).zip(&self.rounded);
+        for (row, (((previous, rho), rounded), scale)) in memory.zip(&self.scale).enumerate() {
+            to[row] = match *previous {
+                NONE => scale * column[row],
+                before => {
+                    let before = before as usize;
+                    let new = to[before] * self.unscale[before];
+                    scale * (column[row] - rho * column[before] + rounded * new)
                 }
             };
         }
