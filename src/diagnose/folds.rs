@@ -196,10 +196,9 @@ impl Folds {
         let linear = rows.linear;
         let mut raw = linear.constant.clone();
         for effect in told {
-            let own = rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)?;
-            let (at, count) = (raw.ncols(), effect.columns.ncols());
-            raw = raw.insert_columns(at, count, 0.0);
-            raw.columns_mut(at, count).copy_from(&(own.columns(0, count) * effect.score.room));
+            let (own, at) = (effect.raw(search)?, raw.ncols());
+            raw = raw.insert_columns(at, own.ncols(), 0.0);
+            raw.columns_mut(at, own.ncols()).copy_from(&own);
         }
         let owner = owners(search)?;
         let mut white = raw.clone();

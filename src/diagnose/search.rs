@@ -45,6 +45,12 @@ impl Active {
         (self.candidate, self.score.coefficients, parameters)
     }
 
+    /// Its columns as they are, m and rad; `None` where a feature is not there.
+    pub fn raw(&self, search: &Search) -> Option<DMatrix<f64>> {
+        let raw = search.rows.raw(&search.candidates[self.candidate], &self.score.parameters)?;
+        Some(raw.columns(0, self.columns.ncols()) * self.score.room)
+    }
+
     /// In the place of another.
     fn instead_of(self, other: &Active) -> Active {
         Active { near: other.near.clone(), hidden: other.hidden, ..self }

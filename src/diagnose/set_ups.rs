@@ -41,7 +41,7 @@ const FEWEST: usize = 6;
 /// Every set-up left out in turn; nothing where there is only one.
 pub(super) fn left_out(search: &Search, told: &[Active], placebos: &[Option<Placebo>]) -> Vec<SetUpLeftOut> {
     let names = names(search);
-    let effects: Option<Vec<DMatrix<f64>>> = told.iter().map(|effect| raw(search, effect)).collect();
+    let effects: Option<Vec<DMatrix<f64>>> = told.iter().map(|effect| effect.raw(search)).collect();
     let meaningless: Vec<DMatrix<f64>> = placebos.iter().flatten().map(|p| p.raw.clone()).collect();
     let (Some(effects), true) = (effects, says(search, &names)) else { return Vec::new() };
     let geometric = SetUps::new(search, &names, &[]).left(search);
@@ -66,12 +66,6 @@ pub(super) fn left_out(search: &Search, told: &[Active], placebos: &[Option<Plac
         }
     };
     names.iter().map(one).collect()
-}
-
-/// Columns of an effect, m and rad.
-fn raw(search: &Search, effect: &Active) -> Option<DMatrix<f64>> {
-    let raw = search.rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)?;
-    Some(raw.columns(0, effect.columns.ncols()) * effect.score.room)
 }
 
 /// Whether there are several set-ups, and every one says where the machine stands.

@@ -13,8 +13,8 @@ pub(super) struct Whitener {
     scale: Vec<f64>,
     /// One over it.
     unscale: Vec<f64>,
-    /// Whether any row remembers another.
-    remembers: bool,
+    /// Whether no row remembers another.
+    is_white: bool,
     /// Rows that are left out.
     pub out: Vec<bool>,
 }
@@ -32,7 +32,7 @@ impl Whitener {
             rounded: vec![0.0; rows],
             scale: vec![0.0; rows],
             unscale: Vec::new(),
-            remembers: false,
+            is_white: true,
             out,
         };
         for (run, noise) in runs.iter().zip(noise) {
@@ -63,13 +63,13 @@ impl Whitener {
             }
         }
         whitener.unscale = whitener.scale.iter().map(|scale| scale.recip()).collect();
-        whitener.remembers = whitener.previous.iter().any(|before| *before != NONE);
+        whitener.is_white = whitener.previous.iter().all(|before| *before == NONE);
         whitener
     }
 
     /// A column of rows, whitened, (61); rows that are left out become 0.
     pub fn apply(&self, column: &[f64], to: &mut [f64]) {
-        if !self.remembers {
+        if self.is_white {
             return self.plain(column, to);
         }
         let memory = self.previous.iter().zip(&self.rho).zip(&self.rounded);
