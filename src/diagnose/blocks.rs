@@ -6,7 +6,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::coarse::{AtPoint, Features, Level};
 use super::score::{BATCH, Best, Field, Rows, best, is_of_number, judge, key, lengths, unit};
-use super::space::Space;
 use crate::effects::{Candidate, Slot};
 use crate::lie::Twist;
 
@@ -30,7 +29,7 @@ impl Rows<'_> {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
         let level = &self.coarse.levels()[number];
         let (space, left) = field.coarse[number].get_or_init(|| {
-            let space = Space::of_factor(level.reduce_all(field.space.factor()));
+            let space = field.space.reduced(number, |panel| level.reduce_panel(panel));
             (space, DVector::from_vec(level.reduce(field.left.as_slice())))
         });
         let answers: Vec<Vec<Arc<Vec<f64>>>> = (candidate.coefficients.iter())

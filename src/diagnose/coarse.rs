@@ -2,8 +2,7 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::DMatrix;
-
+use super::panel::{LEVELS, Panel, WIDTH};
 use crate::effects::Candidate;
 use crate::feature::Samples;
 use crate::identify::Linear;
@@ -115,6 +114,10 @@ impl Coarse {
         if size >= 2 * SHORTER {
             sizes.push(size / SHORTER);
         }
+        if size > 1 {
+            sizes.push(1);
+        }
+        debug_assert!(sizes.len() <= LEVELS);
         Coarse {
             levels: sizes.into_iter().map(|size| Level::new(linear, size)).collect(),
             kept: (0..candidates).map(|_| OnceLock::new()).collect(),
@@ -178,13 +181,12 @@ impl Level {
         sums
     }
 
-    pub fn reduce_all(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(self.weight.len(), columns.ncols());
-        for (c, column) in columns.column_iter().enumerate() {
-            let column: Vec<f64> = column.iter().copied().collect();
-            out.column_mut(c).copy_from_slice(&self.reduce(&column));
+    pub fn reduce_panel(&self, panel: &Panel) -> Panel {
+        let mut sums = vec![[0.0; WIDTH]; self.weight.len()];
+        for (row, to) in panel.rows().iter().zip(&self.row) {
+            sums[*to].iter_mut().zip(row).for_each(|(sum, x)| *sum += x * self.weight[*to]);
         }
-        out
+        Panel::new(sums)
     }
 
     fn evaluate(&self, candidate: &Candidate, fine: &[Samples]) -> Option<Features> {

@@ -66,9 +66,15 @@ pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
 /// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68).
 fn foretold_without(search: &Search, active: &[Active]) -> Option<Vec<f64>> {
     let normal = Normal::new(search, active)?;
-    let all = normal.foretold(None)?;
-    let without = |i| normal.foretold(Some(i)).map_or(f64::NEG_INFINITY, |without| without - all);
+    let all = normal.foretold(&|_| true)?;
+    let without = |i| normal.foretold(&|other| other != i).map_or(f64::NEG_INFINITY, |without| without - all);
     Some((0..active.len()).map(without).collect())
+}
+
+/// By how much better they are foretold by geometry alone, as a logarithm.
+fn foretold_without_all(search: &Search, active: &[Active]) -> Option<f64> {
+    let normal = Normal::new(search, active)?;
+    Some(normal.foretold(&|_| false)? - normal.foretold(&|_| true)?)
 }
 
 /// Whitened normal equations of each fold, with everything that an effect brings along: states and shape.
@@ -112,10 +118,10 @@ impl Normal {
         used.fold(start, |(gram, b), (_, (own, toward))| (gram + own, b + toward))
     }
 
-    /// Logarithm of the probability of every fold, given all others, without one effect.
-    fn foretold(&self, but: Option<usize>) -> Option<f64> {
+    /// Logarithm of the probability of every fold, given all others, by geometry and these effects.
+    fn foretold(&self, takes: &dyn Fn(usize) -> bool) -> Option<f64> {
         let columns: Vec<usize> =
-            (0..self.owner.len()).filter(|c| self.owner[*c].is_none() || self.owner[*c] != but).collect();
+            (0..self.owner.len()).filter(|c| self.owner[*c].is_none_or(takes)).collect();
         let evidence = |fold: Option<usize>| {
             let (gram, b) = self.without(fold);
             let (gram, b) = (gram.select_rows(&columns).select_columns(&columns), b.select_rows(&columns));
@@ -161,10 +167,13 @@ fn grams(
 }
 
 /// What predicts stretches that were left out no worse: effects without which their mean square would fall by more than this factor
-/// go, the worst first; and all of them, where together they do no better than geometry alone. In motion, where noise is known, an
-/// effect stays of which the other stretches foretell how little they know of it in the one that was left out.
+/// go, the worst first; and all of them, where together they do no better than geometry alone. In motion, where noise is known,
+/// effects stay of which the other stretches foretell how little they know of them in the one that was left out.
 pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Active> {
     let mut kept = active.to_vec();
+    let are_harm = |kept: &[Active]| {
+        !search.in_motion || foretold_without_all(search, kept).is_none_or(|without| without > 0.0)
+    };
     while let Some(folds) = Folds::new(search, &kept) {
         let foretold = search.in_motion.then(|| foretold_without(search, &kept)).flatten();
         let is_harm = |i: usize| foretold.as_ref().is_none_or(|without| without[i] > 0.0);
@@ -172,7 +181,7 @@ pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Act
         let better = each.filter(|(i, b)| *b > factor && is_harm(*i));
         match better.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((worst, _)) => drop(kept.remove(worst)),
-            None if folds.without_all(search, &kept) > factor => kept.clear(),
+            None if folds.without_all(search, &kept) > factor && are_harm(&kept) => kept.clear(),
             None => break,
         }
     }

@@ -11,6 +11,9 @@ const REMEMBERED: usize = 12;
 /// A name that needs another shape than its own is credited with so much less of what that takes away: another one may not need it.
 const FOREIGN: f64 = 0.01;
 
+/// Evidence that a shape of its own may lend a rival, as part of the energy that it takes away.
+const OWN: f64 = 0.25;
+
 impl Search<'_> {
     /// Brings up effects with a memory that take away much with what nobody knows of how they were before: as far as their evidence with
     /// it, at their best point so far.
@@ -50,12 +53,17 @@ impl Search<'_> {
         let with_state = self.rows.field(field.space.with(&effect.state));
         let shaped = self.rows.field(with_state.space.with(&effect.shape));
         let candidate = &self.candidates[rival.candidate];
-        let Some(score) = self.rows.score_at(candidate, &rival.score.parameters, &shaped, self.heat) else {
+        let grown = |field: &Field| {
+            let score = self.rows.score_at(candidate, &rival.score.parameters, field, self.heat)?;
+            Some(score.at_best - rival.score.at_best)
+        };
+        let (Some(by_state), Some(by_shape)) = (grown(&with_state), grown(&shaped)) else {
             return rival.weight;
         };
-        let by_shape = field.space.worth(&effect.state, &field.left, self.heat)
-            + (1.0 - FOREIGN) * with_state.space.worth(&effect.shape, &with_state.left, self.heat);
-        let weight = rival.weight + by_shape + score.at_best - rival.score.at_best;
+        let state = rival.weight + field.space.worth(&effect.state, &field.left, self.heat);
+        let shape = (1.0 - FOREIGN) * with_state.space.worth(&effect.shape, &with_state.left, self.heat);
+        // What owes more to a shape of its own than right names do owes it to something else.
+        let weight = (state + shape + by_shape).min(state + by_state + OWN * rival.reach / self.heat);
         log_mean_exp(&[rival.weight, weight])
     }
 }

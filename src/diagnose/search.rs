@@ -9,12 +9,10 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::contained::prefer_simpler;
-use super::evidence::likely_part;
 use super::folds;
 use super::leftover::{Leftover, measure};
 use super::refine::refine;
 use super::score::{Rows, Score};
-use super::shape;
 use super::shares::Shares;
 use super::space::Space;
 use crate::effects::Candidate;
@@ -114,6 +112,8 @@ const SIMILAR: f64 = 0.8;
 const SHAPED: usize = 8;
 /// What comes within this part of the best one's energy is a matter of shape, and the more common name is to be preferred.
 const UNKNOWN_SHAPE: f64 = 0.002;
+/// So is the one that needs less of a shape of its own: the whole slack is lost by one that owes this part of the energy to it.
+const BENT: f64 = 0.05;
 /// But not where it leaves so much more than the noise, as part of it, that anybody would see.
 pub(super) const VISIBLE: f64 = 0.02;
 /// Fewer rows show no shape and foretell nothing.
@@ -125,8 +125,6 @@ const WORTH_SETTLED: f64 = 0.08;
 /// An effect that was taken for the shape of another is at least this part of it; it is looked for where shapes are this part of all.
 const HIDDEN: f64 = 0.8;
 const ODD: f64 = 0.12;
-/// Parameters are others beside unknown states where that brings so much, as a logarithm.
-const MOVED: f64 = 3.0;
 /// So many spaces are kept.
 const GROUNDS: usize = 12;
 /// More effects are not looked for: among settled positions many joints give way at once; what takes more names in a motion has none.
@@ -195,7 +193,8 @@ impl Search<'_> {
             }
             let slack = (UNKNOWN_SHAPE * most).min(VISIBLE * rows.whitener.count() as f64 / heat);
             for rival in &mut rivals[..close] {
-                rival.weight += slack * self.commonness[rival.candidate];
+                let bent = ((most - rival.reach / heat) / (BENT * most)).clamp(0.0, 1.0);
+                rival.weight += slack * (self.commonness[rival.candidate] - bent);
             }
             rivals.sort_by(better_first);
         }
@@ -248,81 +247,6 @@ impl Search<'_> {
     pub fn leftover(&self, space: &Space) -> Leftover {
         let left = space.apply(&self.rows.residual);
         measure(left.as_slice(), self.runs, &self.rows.whitener.out)
-    }
-
-    /// Takes a rival in, at its best point beside what nobody knows of how it was before: a hysteresis is found with another length of
-    /// take-up where the way before the first reversal is wrong.
-    fn settle(&self, rival: &Rival, space: &Arc<Space>) -> Option<Active> {
-        let entered = self.enter(rival, space)?;
-        let candidate = &self.candidates[rival.candidate];
-        if entered.state.ncols() == 0 || candidate.parameters.iter().all(|p| p.whole) {
-            return Some(entered);
-        }
-        let beside = self.rows.field(space.with(&entered.state));
-        let score = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)?;
-        let start = Rival::new(rival.candidate, score.evidence, score);
-        let moved = refine(self.rows, candidate, &start, &beside, self.heat);
-        if moved.score.at_best < start.score.at_best + MOVED {
-            return Some(entered);
-        }
-        let score = self.rows.score_at(
-            candidate,
-            &moved.score.parameters,
-            &self.rows.field(space.clone()),
-            self.heat,
-        )?;
-        self.enter(
-            &Rival { score: Score { evidence: rival.score.evidence, ..score }, ..rival.clone() },
-            space,
-        )
-    }
-
-    /// Takes a rival in, at its best point.
-    pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
-        let mut effect = self.enter_bare(rival, space)?;
-        effect.state = self.state_of(&effect);
-        effect.shape = shape::columns(self.rows, &self.candidates[rival.candidate], &effect);
-        Some(effect)
-    }
-
-    /// Columns of what an effect was before anybody looked.
-    pub fn state_of(&self, effect: &Active) -> DMatrix<f64> {
-        match self.in_motion {
-            true => shape::states(self.rows, &self.candidates[effect.candidate], effect),
-            false => DMatrix::zeros(effect.columns.nrows(), 0),
-        }
-    }
-
-    /// The same without states and shape.
-    pub fn enter_bare(&self, rival: &Rival, space: &Space) -> Option<Active> {
-        let mut score = rival.score.clone();
-        let candidate = &self.candidates[rival.candidate];
-        let columns = self.rows.of(candidate, &score.parameters)?;
-        let mut columns = columns.columns(0, score.coefficients) * score.room;
-        let along = space.along(&columns.as_view());
-        let mut gram = columns.tr_mul(&columns) - along.tr_mul(&along);
-        let mut toward = columns.tr_mul(&space.apply(&self.rows.residual));
-        if score.coefficients > 1 {
-            let part = likely_part(&gram, &toward, self.heat);
-            score.room *= part;
-            columns *= part;
-            gram *= part * part;
-            toward *= part;
-        }
-        (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
-        let solution = gram.cholesky()?.solve(&toward);
-        let none = DMatrix::zeros(columns.nrows(), 0);
-        let (state, shape) = (none.clone(), none);
-        Some(Active {
-            candidate: rival.candidate,
-            score,
-            columns,
-            solution,
-            state,
-            shape,
-            near: Vec::new(),
-            hidden: false,
-        })
     }
 
     /// Forward with full comparison, and after each step every effect against all others in its place.

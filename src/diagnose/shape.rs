@@ -26,7 +26,7 @@ const DECAYS: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 /// The same for what is remembered of the time before a recording.
 const EARLY: [f64; 3] = [0.003, 0.01, 0.03];
 /// Effects with more directions keep the mixture of them that was found.
-const MOST_DIRECTIONS: usize = 3;
+pub(super) const MOST_DIRECTIONS: usize = 3;
 
 /// Whitened columns of the shape of an effect, each times what its coefficient may be.
 pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
@@ -35,8 +35,13 @@ pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DM
 }
 
 /// Whitened columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
-/// recording, nobody knows from which side it came nor how far. As large as the effect itself.
-pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
+/// recording, nobody knows from which side it came nor how far. As large as the effect itself; `answers`: to its motion.
+pub(super) fn states(
+    rows: &Rows,
+    candidate: &Candidate,
+    active: &Active,
+    answers: &[Vec<f64>],
+) -> DMatrix<f64> {
     let stretches = &rows.linear.samples;
     let mut curves: Vec<Vec<f64>> = Vec::new();
     let with_history = candidate.features.iter().filter(|f| f.needs_history());
@@ -77,7 +82,7 @@ pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active) -> DMa
             }
         }
     }
-    whitened(rows, &answers(rows, candidate, active), &curves, amplitude(active))
+    whitened(rows, answers, &curves, amplitude(active))
 }
 
 /// Norm of what an effect does to the whitened rows.
@@ -138,19 +143,25 @@ pub(super) fn is_of_position(candidate: &Candidate) -> bool {
         })
 }
 
-/// Answers of the readings to the directions of the effect, or to the mixture of them that was found.
-fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
+/// Answers of the readings to each direction of the effect.
+pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
     let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();
-    let used = &candidate.coefficients[..active.score.coefficients];
-    for part in used.iter().flat_map(|c| &c.parts) {
+    for part in candidate.coefficients[..active.score.coefficients].iter().flat_map(|c| &c.parts) {
         let is_known = distinct.iter().any(|(slot, d)| *slot == part.slot && *d == part.direction);
         if !is_known {
             distinct.push((part.slot, part.direction));
         }
     }
-    if distinct.len() <= MOST_DIRECTIONS {
-        return distinct.iter().map(|(slot, d)| rows.answer(*slot, *d).to_vec()).collect();
+    distinct.iter().map(|(slot, d)| rows.answer(*slot, *d).to_vec()).collect()
+}
+
+/// The same, or of many directions to the mixture of them that was found.
+pub(super) fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
+    let each = each_answer(rows, candidate, active);
+    if each.len() <= MOST_DIRECTIONS {
+        return each;
     }
+    let used = &candidate.coefficients[..active.score.coefficients];
     let units = rows.units(candidate, &active.score.parameters);
     let mut mixture = vec![0.0; rows.residual.len()];
     for ((coefficient, unit), x) in used.iter().zip(&units).zip(active.solution.iter()) {

@@ -1,15 +1,20 @@
 //! What is known already: geometry and the effects found so far, marginalised out of everything that is judged, `docs/diagnosis.md` (62).
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn, SVD, U1};
+use std::sync::Arc;
+
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, SVD};
+
+use super::panel::{Panel, WIDTH, add_along, take_away};
 
 /// The precision of whitened rows after columns with Gaussian priors have been marginalised: `M = I - W Wᵀ`.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Space {
-    /// `W`, column by column.
-    w: DMatrix<f64>,
-    /// The same, row by row, for products with many columns.
-    wt: DMatrix<f64>,
+    /// `W`, shared by the spaces that grew from this one.
+    panels: Vec<Arc<Panel>>,
 }
+
+/// Readings that tell no more of a parameter than this part of what was known beforehand tell nothing.
+const UNTOLD: f64 = 1e-9;
 
 impl Space {
     /// From whitened columns, each times its prior standard deviation.
@@ -18,29 +23,31 @@ impl Space {
             (0..columns.ncols()).filter(|c| columns.column(*c).norm_squared() > 1e-20).collect();
         let columns = columns.select_columns(&used);
         if columns.ncols() == 0 {
-            return Space { wt: columns.transpose(), w: columns };
+            return Space::default();
         }
         let qr = columns.qr();
         let (q, r) = (qr.q(), qr.r());
         let svd = SVD::new(r, true, false);
         let u = svd.u.expect("asked for");
-        let mut turn = u;
-        for (j, s) in svd.singular_values.iter().enumerate() {
-            let kept = (s * s / (1.0 + s * s)).sqrt();
-            turn.column_mut(j).scale_mut(kept);
+        // Geometry has more parameters than readings can tell.
+        let told: Vec<usize> = (0..u.ncols()).filter(|j| svd.singular_values[*j].powi(2) > UNTOLD).collect();
+        let mut turn = u.select_columns(&told);
+        for (j, mut column) in told.iter().zip(turn.column_iter_mut()) {
+            let s = svd.singular_values[*j];
+            column.scale_mut((s * s / (1.0 + s * s)).sqrt());
         }
-        let w = q * turn;
-        Space { wt: w.transpose(), w }
+        Space::default().and(&(turn.transpose() * q.transpose()))
     }
 
-    /// From its factor `W`.
-    pub fn of_factor(w: DMatrix<f64>) -> Self {
-        Space { wt: w.transpose(), w }
+    /// With more columns of `W`, given row by row.
+    fn and(&self, transposed: &DMatrix<f64>) -> Self {
+        let added = Panel::of_transposed(transposed).into_iter().map(Arc::new);
+        Space { panels: self.panels.iter().cloned().chain(added).collect() }
     }
 
-    /// `W`.
-    pub fn factor(&self) -> &DMatrix<f64> {
-        &self.w
+    /// On the blocks of a level, as `reduce` puts a panel together.
+    pub fn reduced(&self, level: usize, reduce: impl Fn(&Panel) -> Panel) -> Self {
+        Space { panels: self.panels.iter().map(|panel| panel.reduced(level, &reduce)).collect() }
     }
 
     /// With further columns, each times its prior standard deviation: `M - M C (I + CᵀM C)⁻¹ CᵀM`.
@@ -48,26 +55,19 @@ impl Space {
         if columns.ncols() == 0 {
             return self.clone();
         }
-        let mut mc = columns.clone();
-        mc.gemm(-1.0, &self.w, &self.along(&columns.as_view()), 1.0);
-        let mut inner = gram(columns, &mc);
+        let beside = self.beside(columns);
+        let mut inner = gram(columns, &beside);
         (0..inner.nrows()).for_each(|i| inner[(i, i)] += 1.0);
         let Some(factor) = Cholesky::new(inner) else { return self.clone() };
         // W = M C L⁻ᵀ, so that Wᵀ = L⁻¹ (M C)ᵀ.
         let mut back = DMatrix::identity(columns.ncols(), columns.ncols());
         factor.l_dirty().solve_lower_triangular_mut(&mut back);
-        let added = back * mc.transpose();
-        let (old, new) = (self.wt.nrows(), added.nrows());
-        let mut wt = self.wt.clone().resize_vertically(old + new, 0.0);
-        wt.rows_mut(old, new).copy_from(&added);
-        Space { w: wt.transpose(), wt }
+        self.and(&(back * beside.transpose()))
     }
 
     /// Logarithm of the evidence of further columns, each times its prior standard deviation, with what is left of `y` beside the space.
     pub fn worth(&self, columns: &DMatrix<f64>, left: &DVector<f64>, heat: f64) -> f64 {
-        let mut mc = columns.clone();
-        mc.gemm(-1.0, &self.w, &self.along(&columns.as_view()), 1.0);
-        let mut inner = gram(columns, &mc) / heat;
+        let mut inner = gram(columns, &self.beside(columns)) / heat;
         (0..inner.nrows()).for_each(|i| inner[(i, i)] += 1.0);
         let Some(factor) = Cholesky::new(inner) else { return 0.0 };
         let toward = columns.tr_mul(left) / heat;
@@ -75,32 +75,39 @@ impl Space {
             - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
     }
 
-    /// How many columns `W` has.
+    /// How many columns `W` has, those included that are zero.
     pub fn width(&self) -> usize {
-        self.w.ncols()
+        self.panels.len() * WIDTH
     }
 
     /// Adds `Wᵀ x` of columns that are given for some rows from `first` on and are zero elsewhere.
-    pub fn add_along(&self, first: usize, part: &DMatrixView<f64, U1, Dyn>, to: &mut DMatrix<f64>) {
-        to.gemm(1.0, &self.wt.columns(first, part.nrows()), part, 1.0);
+    pub fn add_along(&self, first: usize, part: &DMatrixView<f64>, to: &mut DMatrix<f64>) {
+        add_along(&self.panels, first, part, to);
     }
 
     /// How many parameters it stands for, as far as the rows determine them: the trace of `I - M`.
     pub fn parameters(&self) -> f64 {
-        self.w.norm_squared()
+        self.panels.iter().map(|panel| panel.norm_squared()).sum()
     }
 
     /// `M x`.
     pub fn apply(&self, x: &DVector<f64>) -> DVector<f64> {
-        let along = self.w.tr_mul(x);
-        let mut out = x.clone();
-        out.gemv(-1.0, &self.w, &along, 1.0);
-        out
+        let beside = self.beside(&DMatrix::from_column_slice(x.len(), 1, x.as_slice()));
+        DVector::from_vec(beside.as_slice().to_vec())
+    }
+
+    /// `M C`.
+    fn beside(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut beside = columns.clone();
+        take_away(&self.panels, &self.along(&columns.as_view()), &mut beside);
+        beside
     }
 
     /// `WᵀC`: what of columns lies in the space.
     pub fn along(&self, c: &DMatrixView<f64>) -> DMatrix<f64> {
-        &self.wt * c
+        let mut along = DMatrix::zeros(self.width(), c.ncols());
+        self.add_along(0, c, &mut along);
+        along
     }
 }
 

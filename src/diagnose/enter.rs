@@ -1,0 +1,116 @@
+//! Effects taken in: their columns, their states and shapes, and their coefficients.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::evidence::likely_part;
+use super::refine::refine;
+use super::score::Score;
+use super::search::{Active, Rival, Search};
+use super::shape;
+use super::space::Space;
+use crate::feature::Feature;
+
+/// Parameters are others beside unknown states where that brings so much, as a logarithm.
+const MOVED: f64 = 3.0;
+
+impl Search<'_> {
+    /// Takes a rival in, at its best point beside what nobody knows of how it was before: a hysteresis is found with another length of
+    /// take-up where the way before the first reversal is wrong.
+    pub(super) fn settle(&self, rival: &Rival, space: &Arc<Space>) -> Option<Active> {
+        let entered = self.enter(rival, space)?;
+        let candidate = &self.candidates[rival.candidate];
+        if entered.state.ncols() == 0 || candidate.parameters.iter().all(|p| p.whole) {
+            return Some(entered);
+        }
+        let beside = self.rows.field(space.with(&entered.state));
+        let score = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)?;
+        let start = Rival::new(rival.candidate, score.evidence, score);
+        let moved = refine(self.rows, candidate, &start, &beside, self.heat);
+        if moved.score.at_best < start.score.at_best + MOVED {
+            return Some(entered);
+        }
+        let score = self.rows.score_at(
+            candidate,
+            &moved.score.parameters,
+            &self.rows.field(space.clone()),
+            self.heat,
+        )?;
+        self.enter(
+            &Rival { score: Score { evidence: rival.score.evidence, ..score }, ..rival.clone() },
+            space,
+        )
+    }
+
+    /// Takes a rival in, at its best point.
+    pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
+        let mut effect = self.enter_bare(rival, space)?;
+        let candidate = &self.candidates[rival.candidate];
+        if self.in_motion && candidate.features.iter().any(Feature::needs_history) {
+            let each = shape::each_answer(self.rows, candidate, &effect);
+            if each.len() > shape::MOST_DIRECTIONS {
+                // Their mixture is found where each of them may have been anything beforehand.
+                let anything = space.with(&shape::states(self.rows, candidate, &effect, &each));
+                let (gram, toward) = self.normal(&effect.columns, &anything);
+                effect.solution = solved(gram, &toward)?;
+            }
+        }
+        effect.state = self.state_of(&effect);
+        effect.shape = shape::columns(self.rows, candidate, &effect);
+        Some(effect)
+    }
+
+    /// The same without states and shape.
+    pub fn enter_bare(&self, rival: &Rival, space: &Space) -> Option<Active> {
+        let mut score = rival.score.clone();
+        let candidate = &self.candidates[rival.candidate];
+        let columns = self.rows.of(candidate, &score.parameters)?;
+        let mut columns = columns.columns(0, score.coefficients) * score.room;
+        let (mut gram, mut toward) = self.normal(&columns, space);
+        if score.coefficients > 1 {
+            let part = likely_part(&gram, &toward, self.heat);
+            score.room *= part;
+            columns *= part;
+            gram *= part * part;
+            toward *= part;
+        }
+        let solution = solved(gram, &toward)?;
+        let none = DMatrix::zeros(columns.nrows(), 0);
+        let (state, shape) = (none.clone(), none);
+        Some(Active {
+            candidate: rival.candidate,
+            score,
+            columns,
+            solution,
+            state,
+            shape,
+            near: Vec::new(),
+            hidden: false,
+        })
+    }
+
+    /// Columns of what an effect was before anybody looked.
+    pub fn state_of(&self, effect: &Active) -> DMatrix<f64> {
+        let candidate = &self.candidates[effect.candidate];
+        match self.in_motion {
+            true => {
+                shape::states(self.rows, candidate, effect, &shape::answers(self.rows, candidate, effect))
+            }
+            false => DMatrix::zeros(effect.columns.nrows(), 0),
+        }
+    }
+
+    /// Gram matrix of columns beside a space, and what leads from them to the residuals.
+    fn normal(&self, columns: &DMatrix<f64>, space: &Space) -> (DMatrix<f64>, DVector<f64>) {
+        let along = space.along(&columns.as_view());
+        let gram = columns.tr_mul(columns) - along.tr_mul(&along);
+        (gram, columns.tr_mul(&space.apply(&self.rows.residual)))
+    }
+}
+
+/// Coefficients from normal equations, with their prior.
+fn solved(mut gram: DMatrix<f64>, toward: &DVector<f64>) -> Option<DVector<f64>> {
+    (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
+    Some(gram.cholesky()?.solve(toward))
+}

@@ -1,0 +1,188 @@
+//! Tall matrices in panels of eight columns, row by row: products with few columns read them once, on whatever lanes the machine has.
+
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::{DMatrix, DMatrixView};
+use pulp::{Arch, Simd, WithSimd};
+
+/// Columns of a panel.
+pub(super) const WIDTH: usize = 8;
+/// Rows that are looked at together: a panel's stay in a core's nearest cache while the other factor's columns pass by.
+const ROWS: usize = 512;
+/// Blocks of samples of so many sizes, at most, that a panel can be put together in.
+pub(super) const LEVELS: usize = 3;
+
+/// Eight columns, those that are not used zero.
+#[derive(Default)]
+pub(super) struct Panel {
+    rows: Vec<[f64; WIDTH]>,
+    /// The same on blocks of samples, level by level, once it has been asked for.
+    reduced: [OnceLock<Arc<Panel>>; LEVELS],
+}
+
+impl Panel {
+    pub fn new(rows: Vec<[f64; WIDTH]>) -> Self {
+        Panel { rows, reduced: Default::default() }
+    }
+
+    /// The columns of a matrix that is given row by row: `transposed` has a column per row.
+    pub fn of_transposed(transposed: &DMatrix<f64>) -> Vec<Panel> {
+        let panel = |from: usize| {
+            let count = WIDTH.min(transposed.nrows() - from);
+            let row = |column: &[f64]| {
+                let mut row = [0.0; WIDTH];
+                row[..count].copy_from_slice(&column[from..from + count]);
+                row
+            };
+            Panel::new(transposed.as_slice().chunks_exact(transposed.nrows()).map(row).collect())
+        };
+        (0..transposed.nrows()).step_by(WIDTH).map(panel).collect()
+    }
+
+    pub fn rows(&self) -> &[[f64; WIDTH]] {
+        &self.rows
+    }
+
+    /// On the blocks of a level.
+    pub fn reduced(&self, level: usize, reduce: impl FnOnce(&Panel) -> Panel) -> Arc<Panel> {
+        self.reduced[level].get_or_init(|| Arc::new(reduce(self))).clone()
+    }
+
+    pub fn norm_squared(&self) -> f64 {
+        self.rows.as_flattened().iter().map(|x| x * x).sum()
+    }
+}
+
+/// Adds `Wᵀ C` of columns that are given for some rows from `first` on and are zero elsewhere; `to`: a row per column of the panels, a column per
+/// column of `C`.
+pub(super) fn add_along(panels: &[Arc<Panel>], first: usize, c: &DMatrixView<f64>, to: &mut DMatrix<f64>) {
+    let arch = Arch::new();
+    let columns: Vec<_> = c.column_iter().collect();
+    for from in (0..c.nrows()).step_by(ROWS) {
+        let count = ROWS.min(c.nrows() - from);
+        for (p, panel) in panels.iter().enumerate() {
+            let rows = &panel.rows[first + from..first + from + count];
+            let mut add = |k: usize, sums: &[[f64; WIDTH]]| {
+                for (k, sums) in (k..).zip(sums) {
+                    let mut to = to.column_mut(k);
+                    to.as_mut_slice()[p * WIDTH..][..WIDTH].iter_mut().zip(sums).for_each(|(to, x)| *to += x);
+                }
+            };
+            let own = |k: usize| &columns[k].as_slice()[from..from + count];
+            let mut k = 0;
+            while k < columns.len() {
+                match columns.len() - k {
+                    1 => add(k, &arch.dispatch(Along { rows, c: [own(k)] })),
+                    2 => add(k, &arch.dispatch(Along { rows, c: [own(k), own(k + 1)] })),
+                    3 => add(k, &arch.dispatch(Along { rows, c: [own(k), own(k + 1), own(k + 2)] })),
+                    _ => add(k, &arch.dispatch(Along { rows, c: [0, 1, 2, 3].map(|j| own(k + j)) })),
+                }
+                k += 4;
+            }
+        }
+    }
+}
+
+/// Subtracts `W A` from columns; `along`: `A`, a row per column of the panels, a column per column that it is taken from.
+pub(super) fn take_away(panels: &[Arc<Panel>], along: &DMatrix<f64>, from: &mut DMatrix<f64>) {
+    let arch = Arch::new();
+    let panels: Vec<&[[f64; WIDTH]]> = panels.iter().map(|panel| panel.rows()).collect();
+    let own = |k: usize| along.as_slice()[k * along.nrows()..][..along.nrows()].as_chunks().0;
+    let rows = from.nrows().max(1);
+    for (chunk, columns) in from.as_mut_slice().chunks_mut(4 * rows).enumerate() {
+        let mut columns: Vec<&mut [f64]> = columns.chunks_mut(rows).collect();
+        let (panels, k) = (&panels[..], 4 * chunk);
+        match &mut columns[..] {
+            [a, b, c, d] => {
+                arch.dispatch(Beside { panels, along: [0, 1, 2, 3].map(|j| own(k + j)), out: [a, b, c, d] })
+            }
+            rest => {
+                (k..).zip(rest).for_each(|(k, a)| arch.dispatch(Beside { panels, along: [own(k)], out: [a] }))
+            }
+        }
+    }
+}
+
+/// `Wᵀ C` of one panel and `K` columns.
+struct Along<'a, const K: usize> {
+    rows: &'a [[f64; WIDTH]],
+    c: [&'a [f64]; K],
+}
+
+impl<const K: usize> WithSimd for Along<'_, K> {
+    type Output = [[f64; WIDTH]; K];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let mut out = [[0.0; WIDTH]; K];
+        let c = self.c.map(|c| &c[..self.rows.len()]);
+        for lane in 0..WIDTH / S::F64_LANES {
+            let mut sums = [simd.splat_f64s(0.0); K];
+            for (i, row) in self.rows.iter().enumerate() {
+                let x = S::as_simd_f64s(row).0[lane];
+                for k in 0..K {
+                    sums[k] = simd.mul_add_e_f64s(x, simd.splat_f64s(c[k][i]), sums[k]);
+                }
+            }
+            for k in 0..K {
+                S::as_mut_simd_f64s(&mut out[k]).0[lane] = sums[k];
+            }
+        }
+        out
+    }
+}
+
+/// `K` columns less `W A`.
+struct Beside<'a, 'b, const K: usize> {
+    panels: &'a [&'a [[f64; WIDTH]]],
+    along: [&'a [[f64; WIDTH]]; K],
+    out: [&'b mut [f64]; K],
+}
+
+impl<const K: usize> WithSimd for Beside<'_, '_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Beside { panels, along, out } = self;
+        for i in 0..out.first().map_or(0, |out| out.len()) {
+            let mut sums = [simd.splat_f64s(0.0); K];
+            for (p, panel) in panels.iter().enumerate() {
+                for (lane, x) in S::as_simd_f64s(&panel[i]).0.iter().enumerate() {
+                    for k in 0..K {
+                        sums[k] = simd.mul_add_e_f64s(*x, S::as_simd_f64s(&along[k][p]).0[lane], sums[k]);
+                    }
+                }
+            }
+            for k in 0..K {
+                out[k][i] -= simd.reduce_sum_f64s(sums[k]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_are_those_of_plain_matrices() {
+        for (width, columns) in [(1, 1), (7, 2), (8, 3), (21, 9)] {
+            let at = |i: usize, j: usize| (0.37 * (i as f64 + 1.0) * (j as f64 + 2.0)).sin();
+            let (w, c) =
+                (DMatrix::from_fn(1200, width, at), DMatrix::from_fn(1200, columns, |i, j| at(j + 3, i)));
+            let panels: Vec<_> = Panel::of_transposed(&w.transpose()).into_iter().map(Arc::new).collect();
+            let mut along = DMatrix::zeros(panels.len() * WIDTH, columns);
+            add_along(&panels, 0, &c.as_view(), &mut along);
+            let plain = w.tr_mul(&c);
+            assert!((along.rows(0, width) - &plain).amax() < 1e-11);
+            assert_eq!(along.rows_range(width..).amax(), 0.0);
+            let mut beside = c.clone();
+            take_away(&panels, &along, &mut beside);
+            assert!((beside - (&c - &w * plain)).amax() < 1e-9);
+            let (mut part, some) = (DMatrix::zeros(along.nrows(), columns), c.rows(0, 40).into_owned());
+            add_along(&panels, 700, &some.as_view(), &mut part);
+            assert!((part.rows(0, width) - w.rows(700, 40).tr_mul(&some)).amax() < 1e-11);
+        }
+    }
+}
