@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use super::coarse::{Coarse, Features};
 use super::evidence::{Worth, evidence, log_mean_exp};
 use super::space::Space;
+use super::waves::Wave;
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Coefficient, Slot};
 use crate::feature::Dimension;
@@ -24,6 +25,9 @@ pub(super) struct Rows<'a> {
     pub(super) coarse: &'a Coarse,
     columns: Mutex<HashMap<Key, Column>>,
     pub(super) coarse_columns: Mutex<HashMap<(usize, Key), Column>>,
+    /// Phases of waves by candidate, and energies of a candidate's pairs of features times an answer.
+    pub(super) waves: Mutex<HashMap<usize, Option<Arc<Vec<Wave>>>>>,
+    pub(super) energies: Mutex<HashMap<(usize, usize, Key), Column>>,
 }
 
 /// What all candidates are judged against: the space, and the residuals beside it, fine and coarse.
@@ -36,7 +40,7 @@ pub(super) struct Field {
 }
 
 /// A column that several candidates share.
-type Column = Arc<Vec<f64>>;
+pub(super) type Column = Arc<Vec<f64>>;
 
 /// What is done with a point's Gram matrix and its way to the residuals.
 type Take<'a> = dyn FnMut(usize, &DMatrix<f64>, &DVector<f64>) + 'a;
@@ -82,6 +86,8 @@ impl<'a> Rows<'a> {
             coarse,
             columns: Mutex::default(),
             coarse_columns: Mutex::default(),
+            waves: Mutex::default(),
+            energies: Mutex::default(),
         }
     }
 
@@ -215,7 +221,7 @@ impl<'a> Rows<'a> {
         if candidate.coefficients.is_empty() {
             return None;
         }
-        if let Some(gains) = self.harmonics(candidate, field).filter(|_| all.len() > WAVES) {
+        if let Some(gains) = self.harmonics(i, candidate, field).filter(|_| all.len() > WAVES) {
             // Far from a line there is next to nothing: evidence of no gain.
             let none = -(candidate.coefficients.len() as f64);
             let peaks = peaks(&gains);

@@ -17,18 +17,26 @@ pub(super) fn powers(x: &[f64], weights: [&[f64]; 2], kappas: &[f64]) -> Option<
     if !(extent > 0.0 && extent.is_finite() && largest > 0.0 && largest.is_finite()) {
         return None;
     }
-    let half = largest.min(WIDEST * TAU / extent);
-    let band_of = |kappa: f64| (0.5 * (kappa.abs() / half + 1.0)) as usize;
+    // Of a real column, what stands at the opposite frequency is the conjugate: bands of a single one lie above nought, those of two
+    // about it.
+    let is_single = weights[1].iter().all(|w| *w == 0.0);
+    let raised = if is_single { 1.0 } else { 0.0 };
+    // The highest frequency needs no band of its own.
+    let half = (largest / (1.0 + raised)).min(WIDEST * TAU / extent) * (1.0 + 1e-9);
+    let band_of = |kappa: f64| (0.5 * (kappa.abs() / half + 1.0 - raised)) as usize;
     let mut order: Vec<usize> = (0..kappas.len()).collect();
     order.sort_by_key(|i| band_of(kappas[*i]));
     let mut powers = vec![[0.0; 2]; kappas.len()];
     for own in order.chunk_by(|a, b| band_of(kappas[*a]) == band_of(kappas[*b])) {
-        let middle = 2.0 * half * band_of(kappas[own[0]]) as f64;
+        let middle = half * (2.0 * band_of(kappas[own[0]]) as f64 + raised);
         let above = Band::new(x, (from, extent), weights, middle, half);
+        if is_single {
+            own.iter().for_each(|i| powers[*i][0] = above.at(kappas[*i].abs()).norm_sqr());
+            continue;
+        }
         let below = (middle > 0.0).then(|| Band::new(x, (from, extent), weights, -middle, half));
         for i in own {
             let kappa = kappas[*i].abs();
-            // Of a real column, what stands at the opposite frequency is the conjugate.
             let here = above.at(kappa);
             let mirrored = below.as_ref().unwrap_or(&above).at(-kappa).conj();
             powers[*i] = [here + mirrored, here - mirrored].map(|twice| 0.25 * twice.norm_sqr());
@@ -83,11 +91,11 @@ impl Band {
 
     fn at(&self, kappa: f64) -> Complex<f64> {
         let off = kappa - self.middle;
-        let index = (off.abs() / self.step).round() as usize % self.both.len();
-        let index = if off < 0.0 { (self.both.len() - index) % self.both.len() } else { index };
-        // Sharing a weight out between two cells dampens short periods.
-        let half = 0.5 * off * self.cell;
-        let sinc = if half.abs() < 1e-6 { 1.0 } else { half.sin() / half };
+        let away = (off.abs() / self.step).round() as usize;
+        let index = if off < 0.0 && away > 0 { self.both.len() - away } else { away };
+        // Sharing a weight out between two cells dampens short periods, by the square of sin(h)/h, h up to 45°.
+        let h = (0.5 * off * self.cell).powi(2);
+        let sinc = 1.0 - h / 6.0 * (1.0 - h / 20.0 * (1.0 - h / 42.0));
         self.both[index] / (sinc * sinc)
     }
 }
@@ -122,6 +130,20 @@ mod tests {
                 let exact = direct(w, kappa);
                 assert!((found - exact).abs() < 0.1 * exact + 2e-3 * largest, "{kappa}: {found} {exact}");
             }
+        }
+    }
+
+    #[test]
+    fn a_column_alone_has_the_powers_that_it_has_beside_another() {
+        let x: Vec<f64> = (0..2000).map(|i| 0.3 * i as f64 + 0.1 * (i as f64).sin()).collect();
+        let first: Vec<f64> = x.iter().map(|x| (0.7 * x).sin() + 0.3 * (2.9 * x).cos()).collect();
+        let second: Vec<f64> = x.iter().map(|x| (1.3 * x).cos()).collect();
+        let kappas: Vec<f64> = (1..=300).map(|i| 0.01 * f64::from(i)).collect();
+        let beside = powers(&x, [&first, &second], &kappas).expect("an extent");
+        let alone = powers(&x, [&first, &vec![0.0; x.len()]], &kappas).expect("an extent");
+        let largest = alone.iter().map(|p| p[0]).fold(0.0, f64::max);
+        for (kappa, (alone, beside)) in kappas.iter().zip(alone.iter().zip(&beside)) {
+            assert!((alone[0] - beside[0]).abs() < 0.02 * largest, "{kappa}: {} {}", alone[0], beside[0]);
         }
     }
 
