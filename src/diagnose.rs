@@ -8,6 +8,7 @@ mod along;
 mod bent;
 mod blocks;
 mod coarse;
+mod companions;
 mod contained;
 mod curves;
 mod diagnosis;
@@ -42,6 +43,7 @@ mod waves;
 mod whereabouts;
 mod whitener;
 
+pub use companions::Companion;
 pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
 pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};
 pub use not_tried::NotTried;

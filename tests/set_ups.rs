@@ -2,7 +2,7 @@
 
 mod common;
 
-use kincal::diagnose::{Diagnosis, Request, diagnose};
+use kincal::diagnose::{Companion, Diagnosis, Request, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
 use kincal::identify::{Loss, Options, fit_setup};
 use kincal::predict::predict;
@@ -125,6 +125,67 @@ fn a_slip_without_a_clock_is_dated_by_the_order_of_samples() {
         let rms = predict(&model, recording, None).unwrap_or_else(|e| panic!("{e}")).rms_m;
         assert!(rms.is_some_and(|rms| rms < 45e-6), "{}: {rms:?}", recording.name());
     }
+}
+
+/// Recordings of one arm in set-ups of their own; `zeros`: of each set-up, by how much each joint stands beyond its command, rad.
+fn referenced_anew(machine: &Machine, zeros: &[[f64; 6]], random: &mut Random) -> Vec<Recording> {
+    let nominal = CalibratedMachine::nominal(machine.clone());
+    let one = |(i, zeros): (usize, &[f64; 6])| {
+        let (name, setup) = (format!("{i}.csv"), format!("place {i}"));
+        let poses = poses(machine, 60, random);
+        let shifted = |pose: &Vec<f64>| pose.iter().zip(zeros).map(|(q, zero)| q + zero).collect();
+        let shifted: Vec<Vec<f64>> = poses.iter().map(shifted).collect();
+        let points = read(&nominal, &name, &setup, &shifted, random);
+        recording(machine, &name, &setup, &poses, &points)
+    };
+    zeros.iter().enumerate().map(one).collect()
+}
+
+#[test]
+fn zeros_of_one_axis_that_come_anew_bring_those_of_the_others_into_the_model() {
+    let machine = common::machine("six_r_arm");
+    let mut random = Random(3);
+    let zeros = [3e-4, -2e-4, -1e-4, 2.5e-4].map(|large| {
+        // The third joint's are a twentieth of the second's: too little for a name.
+        [0.0, large, 0.05 * 3e-4 * random.normal().signum(), 0.0, 0.0, 0.0]
+    });
+    let all = referenced_anew(&machine, &zeros, &mut random);
+    let (known, new) = (&all[..3], &all[3..]);
+    let mut said = said(&machine, known);
+    let joint = |i: usize| machine.commands()[i].clone();
+    assert_eq!(names(&said), [("homing_error", joint(1).as_str())]);
+    let companions = said.companions.clone();
+    let comes_along = |at: String| companions.contains(&Companion { effect: "homing_error".into(), at });
+    assert!(comes_along(joint(2)) && !comes_along(joint(1)), "{companions:?}");
+
+    // The file has them, and a new set-up finds all of them again.
+    let model = said.model(&machine, known, Options::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(model.effects().len(), 1 + companions.len());
+    let found = fit_setup(&model, new, Loss::Squares).unwrap_or_else(|e| panic!("{e}"));
+    let rms = predict(&found, &new[0], None).unwrap_or_else(|e| panic!("{e}")).rms_m;
+    // 20 um in each of three directions.
+    assert!(rms.is_some_and(|rms| rms < 1.1 * 3f64.sqrt() * 20e-6), "{rms:?}");
+}
+
+#[test]
+fn among_set_ups_without_a_clock_nothing_goes_on_from_one_to_the_next() {
+    let machine = common::machine("six_r_arm");
+    let slips = |setups: [&str; 2]| {
+        let mut random = Random(5);
+        let one = |(name, setup)| {
+            let poses = poses(&machine, 20, &mut random);
+            let still = vec![[0.0; 3]; poses.len()];
+            recording(&machine, name, setup, &poses, &still)
+        };
+        let all: Vec<Recording> = ["a.csv", "b.csv"].into_iter().zip(setups).map(one).collect();
+        let facts = RecordingFacts::of(&machine, &all).unwrap_or_else(|e| panic!("{e}"));
+        let candidates = Library::standard().candidates(&machine, &facts).all;
+        let count = |effect: &str| candidates.iter().filter(|c| c.effect == effect).count();
+        (count("setup_slip"), count("coupling_slip"))
+    };
+    // Of every frame, and of six joints in both forms: until the end of its recording, and from then on.
+    assert_eq!(slips(["one", "one"]), (machine.dyads().len(), 12));
+    assert_eq!(slips(["one", "two"]), (0, 6));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::companions::Companion;
 use super::finding::Finding;
 use super::not_tried::NotTried;
 use super::outliers::{Outliers, WithoutOutliers};
@@ -45,12 +46,15 @@ pub struct Diagnosis {
     pub set_ups_left_out: Vec<SetUpLeftOut>,
     /// What was found, strongest evidence first.
     pub findings: Vec<Finding>,
+    /// Joints that have an effect of the findings too, which comes anew with every set-up; the model has them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub companions: Vec<Companion>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
     /// Part of the structure left over by geometry that is no family's shape, 0 to 1, where something was found.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape_share: Option<f64>,
-    /// What the calibrated file is made of: the effects of `findings`, ready to be fitted on the real model.
+    /// What the calibrated file is made of: the effects of `findings` and `companions`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
     /// Effects that could not be looked for in these recordings.

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
 use super::finding::HeldOutPair;
-use super::search::{Active, Search};
+use super::search::{Active, Search, all_but};
 use super::space::gram;
 
 /// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
@@ -63,11 +63,19 @@ pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
     (0..without.len()).filter(|i| without[*i] > 0.0).max_by(|a, b| without[*a].total_cmp(&without[*b]))
 }
 
-/// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68).
+/// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68); none where the others
+/// would have to take it for a shape that right names do not have.
 fn foretold_without(search: &Search, active: &[Active]) -> Option<Vec<f64>> {
     let normal = Normal::new(search, active)?;
     let all = normal.foretold(&|_| true)?;
-    let without = |i| normal.foretold(&|other| other != i).map_or(f64::NEG_INFINITY, |without| without - all);
+    let bends = |i: usize| {
+        let others = all_but(active, Some(i));
+        !others.is_empty() && search.shares(&others).is_misshapen(others.len())
+    };
+    let without = |i: usize| {
+        let better = normal.foretold(&|other| other != i).map(|without| without - all);
+        better.filter(|better| *better <= 0.0 || !bends(i)).unwrap_or(f64::NEG_INFINITY)
+    };
     Some((0..active.len()).map(without).collect())
 }
 

@@ -1,6 +1,7 @@
 //! From what the search took in to what is said: which names hold, what is unexplained, and all figures.
 
 use super::along::along_travel;
+use super::companions::{self, Companion};
 use super::diagnosis::{Diagnosis, Named, by_model, rms_of};
 use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
@@ -101,9 +102,11 @@ pub(super) fn report(
     let unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
     let kept: Vec<Active> = told.iter().map(|(i, ..)| active[*i].clone()).collect();
     let left_over = residual_of(search, &kept);
-    let set_ups_left_out = set_ups::left_out(search, &kept, &placebos);
-    let (findings, named): (Vec<Finding>, Vec<Named>) =
+    let companions = companions::companions(search, library, &kept);
+    let set_ups_left_out = set_ups::left_out(search, &[kept.as_slice(), &companions].concat(), &placebos);
+    let (findings, mut named): (Vec<Finding>, Vec<Named>) =
         told.into_iter().map(|(_, finding, named)| (finding, named)).unzip();
+    named.extend(companions::named(search, (machine, library), &kept, &companions));
     let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
         recordings: linear.spans.iter().map(|s| s.label.clone()).collect(),
@@ -118,6 +121,10 @@ pub(super) fn report(
         shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
         findings,
         unexplained,
+        companions: (companions.iter())
+            .map(|effect| &search.candidates[effect.candidate])
+            .map(|c| Companion { effect: c.effect.clone(), at: c.place.name(machine) })
+            .collect(),
         named,
         not_tried: Vec::new(),
         dropped: linear.fit.dropped,
@@ -226,12 +233,7 @@ fn finding(
         covariance: Some(solved.covariance),
     };
     let sizes = identified.sizes(&search.rows.linear.samples);
-    let named = Named {
-        effect: identified.stored(machine, &sizes),
-        scales: (search.rows.units(candidate, &effect.score.parameters).iter())
-            .map(|u| effect.score.room * u)
-            .collect(),
-    };
+    let named = Named { effect: identified.stored(machine, &sizes), scales: effect.scales(search) };
     let mut confusable_with: Vec<Confusable> = Vec::new();
     for o in odds.iter().filter(|o| o.is_listed) {
         let other = confusable(o, search, machine, family);

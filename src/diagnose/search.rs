@@ -49,6 +49,12 @@ impl Active {
         Some(raw.columns(0, self.columns.ncols()) * self.score.room)
     }
 
+    /// Standard deviations of the priors of its coefficients, SI.
+    pub fn scales(&self, search: &Search) -> Vec<f64> {
+        let units = search.rows.units(&search.candidates[self.candidate], &self.score.parameters);
+        units.iter().map(|unit| self.score.room * unit).collect()
+    }
+
     /// In the place of another.
     fn instead_of(self, other: &Active) -> Active {
         Active { near: other.near.clone(), hidden: other.hidden, ..self }

@@ -3,7 +3,8 @@
 use std::fmt::Write;
 
 use kincal::diagnose::{
-    Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, Unexplained, Where,
+    Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, Unexplained,
+    Where,
 };
 use kincal::effects::in_words;
 use kincal::feature::Dimension;
@@ -29,6 +30,9 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
             let _ = writeln!(text, "   {line}");
         }
     }
+    for line in companions(diagnosis) {
+        let _ = writeln!(text, "\n{line}");
+    }
     if let Some(unexplained) = &diagnosis.unexplained {
         let _ = writeln!(text, "\nunexplained: {}", unexplained.explanation);
         for line in about_unexplained(unexplained) {
@@ -47,6 +51,24 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
 /// Effects that could not be looked for, a line for each reason.
 pub(crate) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
     diagnosis.not_tried.iter().map(|n| format!("{}: {}", n.effects.join(", "), n.because)).collect()
+}
+
+/// Joints that have an effect of the findings too, a line for each effect.
+pub(crate) fn companions(diagnosis: &Diagnosis) -> Vec<String> {
+    let mut by_effect: Vec<(&str, Vec<&str>)> = Vec::new();
+    for Companion { effect, at } in &diagnosis.companions {
+        match by_effect.iter_mut().find(|(known, _)| known == effect) {
+            Some((_, places)) => places.push(at),
+            None => by_effect.push((effect, vec![at])),
+        }
+    }
+    let one = |(effect, places): (&str, Vec<&str>)| {
+        let places = places.join(", ");
+        format!(
+            "the model has a small {effect} of {places} too: what comes anew with every set-up hardly does so at one place alone"
+        )
+    };
+    by_effect.into_iter().map(one).collect()
 }
 
 /// Where there is nothing to be found.
