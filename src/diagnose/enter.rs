@@ -51,7 +51,7 @@ impl Search<'_> {
             let each = shape::each_answer(self.rows, candidate, &effect);
             if each.len() > shape::MOST_DIRECTIONS {
                 // Their mixture is found where each of them may have been anything beforehand.
-                let anything = space.with(&shape::states(self.rows, candidate, &effect, &each));
+                let anything = space.with(&shape::states(self.rows, candidate, &effect, each).white);
                 let (gram, toward) = self.normal(&effect.columns, &anything);
                 effect.solution = solved(gram, &toward)?;
             }
@@ -92,13 +92,14 @@ impl Search<'_> {
 
     /// Columns of what an effect was before anybody looked.
     pub fn state_of(&self, effect: &Active) -> DMatrix<f64> {
+        self.states_of(effect).map_or_else(|| DMatrix::zeros(effect.columns.nrows(), 0), |states| states.white)
+    }
+
+    /// The same, with what they are made of; `None` among settled positions, where every side of approach is known.
+    pub fn states_of(&self, effect: &Active) -> Option<shape::Columns> {
         let candidate = &self.candidates[effect.candidate];
-        match self.in_motion {
-            true => {
-                shape::states(self.rows, candidate, effect, &shape::answers(self.rows, candidate, effect))
-            }
-            false => DMatrix::zeros(effect.columns.nrows(), 0),
-        }
+        let answers = || shape::answers(self.rows, candidate, effect);
+        self.in_motion.then(|| shape::states(self.rows, candidate, effect, answers()))
     }
 
     /// Gram matrix of columns beside a space, and what leads from them to the residuals.

@@ -64,12 +64,21 @@ impl Model {
         own.iter().zip(units).map(|(x, unit)| x * unit * effect.score.room).collect()
     }
 
-    /// Residuals in m and rad with everything taken away. The columns of effects and constants are taken before whitening.
+    /// Residuals in m and rad with everything taken away: constants, effects, and what these were before anybody looked. Columns are taken
+    /// before whitening.
     pub fn residual(&self, search: &Search, active: &[Active]) -> Vec<f64> {
-        self.residual_without(search, active, |_| true)
+        let mut left = self.residual_without(search, active, |_| true);
+        for (i, effect) in active.iter().enumerate().filter(|(_, effect)| effect.state.ncols() > 0) {
+            let Some(states) = search.states_of(effect) else { continue };
+            debug_assert_eq!(states.white, effect.state);
+            let numbers = self.solution.rows(self.offsets[i] + effect.columns.ncols(), effect.state.ncols());
+            let early = states.sum(search.rows, numbers.as_slice());
+            left.iter_mut().zip(early).for_each(|(left, early)| *left -= early);
+        }
+        left
     }
 
-    /// The same with the constants taken away, and the effects that fulfil a condition.
+    /// The same with the constants alone taken away, and the effects that fulfil a condition.
     pub fn residual_without(
         &self,
         search: &Search,

@@ -31,17 +31,17 @@ pub(super) const MOST_DIRECTIONS: usize = 3;
 /// Whitened columns of the shape of an effect, each times what its coefficient may be.
 pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
     let curves = curves(rows, candidate, &active.score.parameters);
-    whitened(rows, &answers(rows, candidate, active), &curves, PART * amplitude(active))
+    whitened(rows, answers(rows, candidate, active), curves, PART * amplitude(active)).white
 }
 
-/// Whitened columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
+/// Columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
 /// recording, nobody knows from which side it came nor how far. As large as the effect itself; `answers`: to its motion.
 pub(super) fn states(
     rows: &Rows,
     candidate: &Candidate,
     active: &Active,
-    answers: &[Vec<f64>],
-) -> DMatrix<f64> {
+    answers: Vec<Vec<f64>>,
+) -> Columns {
     let stretches = &rows.linear.samples;
     let mut curves: Vec<Vec<f64>> = Vec::new();
     let with_history = candidate.features.iter().filter(|f| f.needs_history());
@@ -82,7 +82,7 @@ pub(super) fn states(
             }
         }
     }
-    whitened(rows, answers, &curves, amplitude(active))
+    whitened(rows, answers, curves, amplitude(active))
 }
 
 /// Norm of what an effect does to the whitened rows.
@@ -90,30 +90,66 @@ fn amplitude(active: &Active) -> f64 {
     (&active.columns * &active.solution).norm()
 }
 
-/// Whitened columns of answers times curves, each of this norm.
-fn whitened(rows: &Rows, answers: &[Vec<f64>], curves: &[Vec<f64>], amplitude: f64) -> DMatrix<f64> {
+/// Columns that noise does not hide, each as long as it may be.
+pub(super) struct Columns {
+    /// Whitened.
+    pub white: DMatrix<f64>,
+    /// Which answer and curve the whitened columns were made of, and by what they were multiplied.
+    made_of: Vec<(usize, usize, f64)>,
+    /// How these were mixed.
+    mixture: DMatrix<f64>,
+    answers: Vec<Vec<f64>>,
+    curves: Vec<Vec<f64>>,
+}
+
+impl Columns {
+    /// As they are, m and rad, each times its number, added up.
+    pub fn sum(&self, rows: &Rows, numbers: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.white.nrows()];
+        let mixed = &self.mixture * DVector::from_column_slice(numbers);
+        for ((answer, curve, scale), number) in self.made_of.iter().zip(mixed.iter()) {
+            let (answer, curve) = (&self.answers[*answer], &self.curves[*curve]);
+            for ((sum, a), sample) in sum.iter_mut().zip(answer).zip(&rows.linear.sample) {
+                *sum += number * scale * a * curve[*sample];
+            }
+        }
+        sum
+    }
+}
+
+/// Columns of answers times curves, each of this norm, without the combinations of them that noise hides.
+fn whitened(rows: &Rows, answers: Vec<Vec<f64>>, curves: Vec<Vec<f64>>, amplitude: f64) -> Columns {
     let n = rows.residual.len();
-    let mut columns = Vec::new();
+    let (mut columns, mut made_of) = (Vec::new(), Vec::new());
     let mut white = vec![0.0; n];
-    for answer in answers {
-        for curve in curves {
+    for (a, answer) in answers.iter().enumerate() {
+        for (c, curve) in curves.iter().enumerate() {
             let column: Vec<f64> =
                 answer.iter().zip(&rows.linear.sample).map(|(a, sample)| a * curve[*sample]).collect();
             rows.whitener.apply(&column, &mut white);
             let length = white.iter().map(|x| x * x).sum::<f64>().sqrt();
             if length > 0.0 && length.is_finite() {
                 columns.push(DVector::from_column_slice(&white) * (amplitude / length));
+                made_of.push((a, c, amplitude / length));
             }
         }
     }
-    if columns.is_empty() { DMatrix::zeros(n, 0) } else { thinned(DMatrix::from_columns(&columns)) }
+    let (white, mixture) = match columns.is_empty() {
+        true => (DMatrix::zeros(n, 0), DMatrix::zeros(0, 0)),
+        false => {
+            let all = DMatrix::from_columns(&columns);
+            let mixture = seen(&all);
+            (all * &mixture, mixture)
+        }
+    };
+    Columns { white, made_of, mixture, answers, curves }
 }
 
-/// Columns with the same covariance `S Sᵀ`, without the combinations of them that noise hides.
-fn thinned(columns: DMatrix<f64>) -> DMatrix<f64> {
-    let eigen = gram(&columns, &columns).symmetric_eigen();
+/// Mixtures of columns with the same covariance `S Sᵀ`, without those that noise hides.
+fn seen(columns: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = gram(columns, columns).symmetric_eigen();
     let kept: Vec<usize> = (0..columns.ncols()).filter(|i| eigen.eigenvalues[*i] > HIDDEN * HIDDEN).collect();
-    columns * eigen.eigenvectors.select_columns(&kept)
+    eigen.eigenvectors.select_columns(&kept)
 }
 
 /// Whether one effect is a curve along the travel of a joint, and the other a bump of the same motion there.
