@@ -5,6 +5,7 @@
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
 mod along;
+mod approaches;
 mod bent;
 mod blocks;
 mod coarse;
@@ -43,6 +44,7 @@ mod waves;
 mod whereabouts;
 mod whitener;
 
+pub use approaches::StandsStill;
 pub use companions::Companion;
 pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
 pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};

@@ -83,6 +83,19 @@ pub struct Model {
     /// Room for smooth error motions of every joint, over the tolerance of its dyad, `docs/model.md` (32); 0 for none. The data weigh
     /// factors on it, (33). The motions do not bend the deviations, and are kept beside them.
     pub error_motions: f64,
+    /// Sides of approach that the recordings do not show.
+    pub approaches: Vec<Approach>,
+}
+
+/// From which side a joint came that never moves in a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Approach {
+    /// Index of the recording.
+    pub recording: usize,
+    /// Index of the joint's dyad.
+    pub dyad: usize,
+    /// 1 rising, -1 falling.
+    pub direction: i8,
 }
 
 /// Direction parts other than play: factors on their prior among which the data choose.
@@ -131,6 +144,7 @@ fn attempt(
 ) -> Result<((CalibratedMachine, Fit), Frames)> {
     let varying = &model.varying;
     let mut sources = Sources::new(recordings, machine, varying, &model.dead_bands, progress)?;
+    sources.approach(&model.approaches)?;
     if let Some(count) = model.samples {
         let directions = varying.directions.as_ref();
         sources.pick(count, directions.map_or(1, |d| d.piece_count()), |stretch, k| {

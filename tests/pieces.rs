@@ -106,12 +106,8 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
         let recordings = open(&machine, &record(&machine, &path(&machine, 400), &wrong));
         let varying = Varying { directions: Some(Directions::new(axes.clone())), terms: Vec::new() };
         // Dead bands of nothing: the path is exact.
-        let model = Model {
-            varying,
-            dead_bands: vec![Some(0.0); machine.commands().len()],
-            samples: None,
-            error_motions: 0.0,
-        };
+        let model =
+            Model { varying, dead_bands: vec![Some(0.0); machine.commands().len()], ..Model::default() };
         let (calibrated, fit) = calibrate_model(&machine, &recordings, &model, exact(), &|_| {})
             .unwrap_or_else(|e| panic!("{name}: {e}"));
         let (_, plain) = calibrate(&machine, &recordings, exact()).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -253,8 +249,7 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
         let model = Model {
             varying: Varying { directions: None, terms },
             dead_bands: vec![Some(0.0); machine.commands().len()],
-            samples: None,
-            error_motions: 0.0,
+            ..Model::default()
         };
         let (_, fit) = calibrate_model(&machine, &recordings, &model, exact(), &|_| {})
             .unwrap_or_else(|e| panic!("{name}: {e}"));

@@ -141,6 +141,7 @@ impl Args {
             dead_bands,
             samples: self.samples,
             error_motions: self.error_motions,
+            ..Model::default()
         })
     }
 

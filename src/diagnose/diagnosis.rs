@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::approaches::StandsStill;
 use super::companions::Companion;
 use super::finding::Finding;
 use super::not_tried::NotTried;
@@ -49,6 +50,9 @@ pub struct Diagnosis {
     /// Joints that have an effect of the findings too, which comes anew with every set-up; the model has them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub companions: Vec<Companion>,
+    /// Joints that stand still all through a recording, and have an effect that depends on how they came there.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stand_still: Vec<StandsStill>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
     /// Part of the structure left over by geometry that is no family's shape, 0 to 1, where something was found.

@@ -92,7 +92,8 @@ impl Search<'_> {
 
     /// Columns of what an effect was before anybody looked.
     pub fn state_of(&self, effect: &Active) -> DMatrix<f64> {
-        self.states_of(effect).map_or_else(|| DMatrix::zeros(effect.columns.nrows(), 0), |states| states.white)
+        self.states_of(effect)
+            .map_or_else(|| DMatrix::zeros(effect.columns.nrows(), 0), |states| states.white)
     }
 
     /// The same, with what they are made of; `None` among settled positions, where every side of approach is known.

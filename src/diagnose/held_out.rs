@@ -68,14 +68,22 @@ impl Model {
     /// before whitening.
     pub fn residual(&self, search: &Search, active: &[Active]) -> Vec<f64> {
         let mut left = self.residual_without(search, active, |_| true);
-        for (i, effect) in active.iter().enumerate().filter(|(_, effect)| effect.state.ncols() > 0) {
-            let Some(states) = search.states_of(effect) else { continue };
-            debug_assert_eq!(states.white, effect.state);
-            let numbers = self.solution.rows(self.offsets[i] + effect.columns.ncols(), effect.state.ncols());
-            let early = states.sum(search.rows, numbers.as_slice());
+        for early in (0..active.len()).filter_map(|i| self.early(search, active, i)) {
             left.iter_mut().zip(early).for_each(|(left, early)| *left -= early);
         }
         left
+    }
+
+    /// What effect `i` was before anybody looked, beside what its family says, m and rad; `None` where that is known.
+    pub fn early(&self, search: &Search, active: &[Active], i: usize) -> Option<Vec<f64>> {
+        let effect = &active[i];
+        if effect.state.ncols() == 0 {
+            return None;
+        }
+        let states = search.states_of(effect)?;
+        debug_assert_eq!(states.white, effect.state);
+        let numbers = self.solution.rows(self.offsets[i] + effect.columns.ncols(), effect.state.ncols());
+        Some(states.sum(search.rows, numbers.as_slice()))
     }
 
     /// The same with the constants alone taken away, and the effects that fulfil a condition.

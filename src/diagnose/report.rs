@@ -1,6 +1,7 @@
 //! From what the search took in to what is said: which names hold, what is unexplained, and all figures.
 
 use super::along::along_travel;
+use super::approaches::approaches;
 use super::companions::{self, Companion};
 use super::diagnosis::{Diagnosis, Named, by_model, rms_of};
 use super::finding::{Confusable, Finding, Meaningless, Size};
@@ -125,6 +126,7 @@ pub(super) fn report(
             .map(|effect| &search.candidates[effect.candidate])
             .map(|c| Companion { effect: c.effect.clone(), at: c.place.name(machine) })
             .collect(),
+        stand_still: approaches(search, &kept, machine),
         named,
         not_tried: Vec::new(),
         dropped: linear.fit.dropped,

@@ -36,12 +36,7 @@ pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DM
 
 /// Columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
 /// recording, nobody knows from which side it came nor how far. As large as the effect itself; `answers`: to its motion.
-pub(super) fn states(
-    rows: &Rows,
-    candidate: &Candidate,
-    active: &Active,
-    answers: Vec<Vec<f64>>,
-) -> Columns {
+pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active, answers: Vec<Vec<f64>>) -> Columns {
     let stretches = &rows.linear.samples;
     let mut curves: Vec<Vec<f64>> = Vec::new();
     let with_history = candidate.features.iter().filter(|f| f.needs_history());

@@ -179,14 +179,14 @@ fn candidate(
     }
     match family.clock {
         Clock::One if facts.time.is_some() && !facts.one_clock => return Err(grid::MANY_CLOCKS.into()),
-        Clock::None | Clock::NoneOfSeveral if facts.one_clock => {
+        Clock::None | Clock::NoneOfOneSetup | Clock::NoneOfSeveral if facts.one_clock => {
             return Err("the recordings' clock says what came first".into());
         }
-        Clock::None if facts.setups.len() > 1 => {
+        Clock::NoneOfOneSetup if facts.setups.len() > 1 => {
             return Err("they are of several set-ups, and no clock says which came first".into());
         }
         Clock::NoneOfSeveral if facts.begins.len() == 1 => return Err("there is one recording".into()),
-        Clock::None | Clock::NoneOfSeveral if facts.begins.is_empty() => {
+        Clock::None | Clock::NoneOfOneSetup | Clock::NoneOfSeveral if facts.begins.is_empty() => {
             return Err("two recordings have one name, and nothing says which came first".into());
         }
         _ => {}

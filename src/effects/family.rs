@@ -160,9 +160,10 @@ pub enum Clock {
     Any,
     /// They follow one another on one clock, as what goes on from one to the next needs.
     One,
-    /// They have no time, or clocks of their own, and one set-up: only the order of samples says what came first. Which set-up came
-    /// first nothing says.
+    /// They have no time, or clocks of their own: only the order of samples says what came first.
     None,
+    /// The same, and they are of one set-up: which of several came first nothing says.
+    NoneOfOneSetup,
     /// They have no time, or clocks of their own, and there are several of them, so that something may end with its recording.
     NoneOfSeveral,
 }

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use rayon::prelude::*;
 
+use super::Approach;
 use super::stretch::{Beginning, Memories, Stretch, stretches};
 use crate::error::Result;
 use crate::feature::{Feature, gravity_of};
@@ -204,6 +205,17 @@ impl<'a> Sources<'a> {
             source.cached = Some(stretches.collect::<Result<_>>()?);
         }
         Ok(())
+    }
+
+    /// Takes features anew where joints stand still, having come from these sides.
+    pub fn approach(&mut self, approaches: &[Approach]) -> Result<()> {
+        for approach in approaches {
+            if let Some(beginning) = self.all.get_mut(approach.recording).and_then(|s| s.beginning.as_mut()) {
+                beginning.approach(approach.dyad, approach.direction);
+            }
+        }
+        let is_cached = self.all.iter().any(|s| s.cached.is_some());
+        if is_cached && !approaches.is_empty() { self.cache() } else { Ok(()) }
     }
 
     /// Whether some feature depends on what weighs.

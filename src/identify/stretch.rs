@@ -78,6 +78,13 @@ impl Beginning {
         };
         Ok(Beginning { commands: first.found(), dyads, gravity_b: gravity_of(recording, machine, None) })
     }
+
+    /// Features of the joint of dyad `j`, which never moves, are those behind a motion in this direction.
+    pub fn approach(&mut self, j: usize, direction: i8) {
+        if let Some(first) = self.dyads.get_mut(j).filter(|first| **first == 0) {
+            *first = direction;
+        }
+    }
 }
 
 /// Dead bands of the joints of all dyads from those of the commands.

@@ -7,9 +7,7 @@ use kincal::location::LocationErrors;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::plot::{AFTER, BACKWARD, BEFORE, CURVE, FORWARD, Layer, Marks, NEITHER, Plot, envelope, thinned};
-use super::text::{
-    CALM, about, about_unexplained, amount, companions, figures, not_tried, probability, tests,
-};
+use super::text::{CALM, about, about_unexplained, amount, beside, figures, not_tried, probability, tests};
 use crate::cli::output::Kind;
 
 /// Dots and corners of all pictures together, and of one at most: the file stays below a megabyte.
@@ -51,7 +49,7 @@ pub(crate) fn page(diagnosis: &Diagnosis) -> String {
                         ul.plain { @for line in about(diagnosis, finding) { li { (line) } } }
                         @if let Some(curve) = traces.findings.get(i) { (against(curve, Some(finding), most)) }
                     }
-                    @for line in companions(diagnosis) { p { (line) } }
+                    @for line in beside(diagnosis) { p { (line) } }
                 }
                 @if let Some(unexplained) = &diagnosis.unexplained {
                     h2 { "Unexplained" }

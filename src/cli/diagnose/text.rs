@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use kincal::diagnose::{
-    Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, Unexplained,
-    Where,
+    Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, StandsStill,
+    Unexplained, Where,
 };
 use kincal::effects::in_words;
 use kincal::feature::Dimension;
@@ -30,7 +30,7 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
             let _ = writeln!(text, "   {line}");
         }
     }
-    for line in companions(diagnosis) {
+    for line in beside(diagnosis) {
         let _ = writeln!(text, "\n{line}");
     }
     if let Some(unexplained) = &diagnosis.unexplained {
@@ -53,8 +53,8 @@ pub(crate) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
     diagnosis.not_tried.iter().map(|n| format!("{}: {}", n.effects.join(", "), n.because)).collect()
 }
 
-/// Joints that have an effect of the findings too, a line for each effect.
-pub(crate) fn companions(diagnosis: &Diagnosis) -> Vec<String> {
+/// What the model has beside the findings, a line each: joints that have an effect of theirs too, and sides of approach.
+pub(crate) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
     let mut by_effect: Vec<(&str, Vec<&str>)> = Vec::new();
     for Companion { effect, at } in &diagnosis.companions {
         match by_effect.iter_mut().find(|(known, _)| known == effect) {
@@ -68,7 +68,14 @@ pub(crate) fn companions(diagnosis: &Diagnosis) -> Vec<String> {
             "the model has a small {effect} of {places} too: what comes anew with every set-up hardly does so at one place alone"
         )
     };
-    by_effect.into_iter().map(one).collect()
+    let still = |StandsStill { recording, at, direction, .. }: &StandsStill| {
+        let side = if *direction > 0 { "rising" } else { "falling" };
+        format!(
+            "{at} stands still all through {recording}, where the readings say that it came there {side}; \
+             a column {at}_direction[1] of {direction} would say so too"
+        )
+    };
+    by_effect.into_iter().map(one).chain(diagnosis.stand_still.iter().map(still)).collect()
 }
 
 /// Where there is nothing to be found.
