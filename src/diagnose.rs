@@ -25,6 +25,7 @@ mod not_tried;
 mod odds;
 mod outliers;
 mod panel;
+mod passing;
 mod placebo;
 mod reach;
 mod refine;
@@ -134,8 +135,11 @@ pub fn diagnose(
             known: RefCell::default(),
             grounds: RefCell::default(),
         };
-        active = search.run(&active);
-        let judged = noise_of(&linear, &report::residual_of(&search, &active), &runs, &out, &facts);
+        let judge =
+            |active: &[Active]| noise_of(&linear, &report::residual_of(&search, active), &runs, &out, &facts);
+        let is_settled = |judged: &[Noise]| noise.iter().zip(judged).all(|(a, b)| a.is_close(b));
+        active = search.run(&active, |active| round == NOISE_ROUNDS || is_settled(&judge(active)));
+        let judged = judge(&active);
         let report = |search: &Search, active: &[Active]| -> Diagnosis {
             let mut diagnosis = report::report(search, active, machine, library, &noise);
             diagnosis.not_tried = not_tried(&candidates);
@@ -156,7 +160,7 @@ pub fn diagnose(
                 continue;
             }
         }
-        if round == NOISE_ROUNDS || noise.iter().zip(&judged).all(|(a, b)| a.is_close(b)) {
+        if round == NOISE_ROUNDS || is_settled(&judged) {
             let heat = search.leftover(&search.beside(&active, None)).heat;
             if heat < HOT {
                 let active = folds::useful(&search, &active, most_wild);
@@ -164,7 +168,7 @@ pub fn diagnose(
             }
             // Much is left, as it always is on real machines: the simplest names that stand out from it count.
             let search = Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
-            active = folds::useful(&search, &search.run(&active), most_wild);
+            active = folds::useful(&search, &search.run(&active, |_| true), most_wild);
             return Ok(report(&search, &active));
         }
         (noise, round) = (judged, round + 1);

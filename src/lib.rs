@@ -81,6 +81,7 @@ pub mod describe;
 pub mod diagnose;
 mod document;
 pub mod effects;
+mod elementary;
 pub mod error;
 pub mod error_motion;
 pub mod feature;

@@ -8,6 +8,8 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use num_dual::{Dual64, DualNum, DualSVec64};
 
+use crate::elementary::{exponentials, sines_cosines};
+
 /// A number that the kinematic kernels can work with: `f64`, [`Dual64`], [`DualSVec64`].
 ///
 /// Dimensionless by itself; the functions that take it say whether it stands for m, rad or 1.
@@ -28,6 +30,16 @@ pub trait Scalar:
 
     /// `e` to the power of `self`.
     fn exp(self) -> Self;
+
+    /// Sines and cosines of a whole column of angles in rad.
+    fn sin_cos_all(angles: &[Self]) -> (Vec<Self>, Vec<Self>) {
+        angles.iter().map(|x| x.sin_cos()).unzip()
+    }
+
+    /// `e` to the power of each of a column.
+    fn exp_all(column: &mut [Self]) {
+        column.iter_mut().for_each(|x| *x = x.exp());
+    }
 
     /// Angle in rad of the point (`x`, `self`), as [`f64::atan2`].
     fn atan2(self, x: Self) -> Self;
@@ -68,6 +80,12 @@ impl Scalar for f64 {
     #[inline(always)]
     fn exp(self) -> Self {
         f64::exp(self)
+    }
+    fn sin_cos_all(angles: &[Self]) -> (Vec<Self>, Vec<Self>) {
+        sines_cosines(angles)
+    }
+    fn exp_all(column: &mut [Self]) {
+        exponentials(column);
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {

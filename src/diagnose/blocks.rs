@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::coarse::{AtPoint, Features, Level};
 use super::score::{BATCH, Best, Field, Rows, best, is_of_number, judge, key, lengths, unit};
+use super::space::Space;
 use crate::effects::{Candidate, Slot};
 use crate::lie::Twist;
 
@@ -28,10 +29,7 @@ impl Rows<'_> {
     ) {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
         let level = &self.coarse.levels()[number];
-        let (space, left) = field.coarse[number].get_or_init(|| {
-            let space = field.space.reduced(number, |panel| level.reduce_panel(panel));
-            (space, DVector::from_vec(level.reduce(field.left.as_slice())))
-        });
+        let (space, left) = self.on_level(field, number);
         let answers: Vec<Vec<Arc<Vec<f64>>>> = (candidate.coefficients.iter())
             .map(|c| c.parts.iter().map(|p| self.coarse_answer(number, p.slot, p.direction)).collect())
             .collect();
@@ -74,7 +72,17 @@ impl Rows<'_> {
         }
     }
 
-    fn coarse_answer(&self, level: usize, slot: Slot, direction: Twist<f64>) -> Arc<Vec<f64>> {
+    /// Space and residuals on the blocks of a level.
+    pub(super) fn on_level<'f>(&self, field: &'f Field, number: usize) -> &'f (Space, DVector<f64>) {
+        let level = &self.coarse.levels()[number];
+        field.coarse[number].get_or_init(|| {
+            let space = field.space.reduced(number, |panel| level.reduce_panel(panel));
+            (space, DVector::from_vec(level.reduce(field.left.as_slice())))
+        })
+    }
+
+    /// How the readings answer to a twist in a slot, whitened, on the blocks of a level.
+    pub(super) fn coarse_answer(&self, level: usize, slot: Slot, direction: Twist<f64>) -> Arc<Vec<f64>> {
         let key = (level, key(slot, direction));
         if let Some(known) = self.coarse_columns.lock().ok().and_then(|map| map.get(&key).cloned()) {
             return known;

@@ -214,16 +214,24 @@ impl Level {
             true => [grid.get(grid.len() / 2), None],
             false => [grid.first(), grid.last()],
         };
-        points.into_iter().flatten().all(|point| {
-            candidate.features.iter().all(|feature| {
-                let column = feature.over(fine, point);
-                let (mut off, mut all) = (0.0, 0.0);
-                for (x, middle) in column.iter().zip(&self.middle) {
-                    off += (x - column[*middle]).powi(2);
-                    all += x * x;
-                }
-                off <= ROUGH * ROUGH * all
-            })
-        })
+        points
+            .into_iter()
+            .flatten()
+            .all(|point| candidate.features.iter().all(|feature| self.follows(&feature.over(fine, point))))
+    }
+
+    /// Whether a column changes little within a block.
+    pub fn follows(&self, column: &[f64]) -> bool {
+        let (mut off, mut all) = (0.0, 0.0);
+        for (x, middle) in column.iter().zip(&self.middle) {
+            off += (x - column[*middle]).powi(2);
+            all += x * x;
+        }
+        off <= ROUGH * ROUGH * all
+    }
+
+    /// A column in the middles of the blocks.
+    pub fn in_middles(&self, column: &[f64]) -> Vec<f64> {
+        self.middle.chunk_by(|a, b| a == b).map(|block| column[block[0]]).collect()
     }
 }

@@ -107,12 +107,7 @@ impl<'a> Rows<'a> {
     }
 
     pub fn whiten(&self, columns: &mut DMatrix<f64>) {
-        let mut white = vec![0.0; columns.nrows()];
-        for c in 0..columns.ncols() {
-            let mut column = columns.column_mut(c);
-            self.whitener.apply(column.as_slice(), &mut white);
-            column.copy_from_slice(&white);
-        }
+        self.whitener.apply_all(columns);
     }
 
     /// How the readings answer to a twist in a slot, not whitened.
@@ -244,7 +239,8 @@ impl<'a> Rows<'a> {
         let kept = self.coarse.features(i, candidate, &self.linear.samples);
         self.table(candidate, &candidate.grid, field, kept, heat, &all, &mut table);
         let rough = summary(&candidate.grid, &table, &all)?;
-        if kept.is_none() || !self.whitener.remembers() {
+        let is_nothing = rough.at_best <= 0.0 && !candidate.jumps();
+        if kept.is_none() || !self.whitener.remembers() || is_nothing {
             return Some(rough);
         }
         // White rows of noise that remembers are differences: what jumps is in a single one, and drowns in its block.

@@ -260,8 +260,9 @@ impl Search<'_> {
     /// A step counts only if its evidence stands out from the structure that it leaves, and if it takes away more than the shape of
     /// what was found before may be off by.
     ///
-    /// `from`: what had been found under another noise.
-    pub fn run(&self, from: &[Active]) -> Vec<Active> {
+    /// `from`: what had been found under another noise. `holds`: whether the noise is still what it is searched with; where nothing had been
+    /// found and the first effect changes it, everything else is left to the search with the noise that is left.
+    pub fn run(&self, from: &[Active], holds: impl Fn(&[Active]) -> bool) -> Vec<Active> {
         let mut active: Vec<Active> = Vec::new();
         for effect in from {
             let space = self.beside(&active, None);
@@ -285,6 +286,9 @@ impl Search<'_> {
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let Some(entered) = self.next(&active) else { break };
             active.push(entered);
+            if from.is_empty() && active.len() == 1 && !holds(&active) {
+                return active;
+            }
             if active.len() > 1 {
                 self.swap(&mut active);
             }

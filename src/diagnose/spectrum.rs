@@ -6,6 +6,8 @@ use std::f64::consts::TAU;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
+use crate::elementary::sines_cosines;
+
 /// Absolute values squared of `Σ_i w_i exp(i κ x_i)` at each of these `κ`, of two columns of weights; `None` where there is no extent.
 ///
 /// Frequencies are taken band by band, each shifted to nought: a grid of positions fine enough for the highest one would be too long.
@@ -75,12 +77,16 @@ impl Band {
         let length = fast(PADDED * cells as usize);
         let mut both = vec![Complex::new(0.0, 0.0); length];
         let [first, second] = weights;
-        for (x, (a, b)) in x.iter().zip(first.iter().zip(second)) {
+        let shift = (middle != 0.0).then(|| {
+            let angles: Vec<f64> = x.iter().map(|x| -middle * (x - from)).collect();
+            sines_cosines(&angles)
+        });
+        for (k, (x, (a, b))) in x.iter().zip(first.iter().zip(second)).enumerate() {
             let at = (x - from) / cell;
             let (index, part) = (at as usize, at.fract());
             let mut weight = Complex::new(*a, *b);
-            if middle != 0.0 {
-                weight *= Complex::cis(-middle * (x - from));
+            if let Some((sines, cosines)) = &shift {
+                weight *= Complex::new(cosines[k], sines[k]);
             }
             both[index] += weight * (1.0 - part);
             both[index + 1] += weight * part;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::passing::{Passed, add_energies};
 use super::score::{Column, Field, Key, Rows, key};
 use super::spectrum;
 use crate::effects::{Candidate, Coefficient};
@@ -9,8 +10,6 @@ use crate::feature::Feature;
 
 /// Rows on which the energy of waves is judged.
 const MEMORIES: usize = 256;
-/// Of more frequencies, the energy is asked at so many.
-const KNOTS: usize = 1000;
 /// Phases that differ by no more than this part of the largest are multiples of each other.
 const STRAIGHT: f64 = 1e-9;
 
@@ -139,36 +138,18 @@ impl Rows<'_> {
         let mut plain = vec![0.0; answer.len()];
         self.whitener.plain(answer, &mut plain);
         let step = plain.len().div_ceil(MEMORIES).max(1);
-        // (energy, what is remembered, what of that is rounding, advance of the phase) of the rows that are looked at.
         let looked_at = (0..plain.len()).step_by(step).map(|row| {
             let energy = plain[row] * plain[row] * step as f64;
             let (before, rho, rounded) = self.whitener.memory(row).unwrap_or((row, 0.0, 0.0));
-            (energy, rho, rounded, x[self.linear.sample[row]] - x[self.linear.sample[before]])
-        });
-        let (remembering, forgetful): (Vec<_>, Vec<_>) = looked_at.partition(|(_, rho, ..)| *rho > 0.0);
-        let constant: f64 = forgetful.iter().map(|(energy, ..)| energy).sum();
-        let at = |factor: f64| {
-            let of = |(energy, rho, rounded, advance): &(f64, f64, f64, f64)| {
-                let cos = (factor * advance).cos();
-                let passes = |part: f64| 1.0 + part * part - 2.0 * part * cos;
-                energy * passes(*rho) / passes(*rounded)
-            };
-            constant + remembering.iter().map(of).sum::<f64>()
-        };
-        if remembering.is_empty() || factors.len() <= KNOTS {
-            energies.iter_mut().zip(factors).for_each(|(sum, factor)| *sum += at(*factor));
-            return;
-        }
-        // It changes as slowly with the factor as the phase advances from row to row: knots are enough.
-        let stride = factors.len().div_ceil(KNOTS);
-        for from in (0..factors.len()).step_by(stride) {
-            let to = (from + stride).min(factors.len() - 1);
-            let (first, last) = (at(factors[from]), at(factors[to]));
-            for i in from..(from + stride).min(factors.len()) {
-                let extent = factors[to] - factors[from];
-                let part = if extent == 0.0 { 0.0 } else { (factors[i] - factors[from]) / extent };
-                energies[i] += first + part * (last - first);
+            Passed {
+                energy,
+                rho,
+                rounded,
+                advance: x[self.linear.sample[row]] - x[self.linear.sample[before]],
             }
-        }
+        });
+        let (remembering, forgetful): (Vec<_>, Vec<_>) = looked_at.partition(|row| row.rho > 0.0);
+        let constant: f64 = forgetful.iter().map(|row| row.energy).sum();
+        add_energies(&remembering, constant, factors, energies);
     }
 }

@@ -8,12 +8,14 @@ use std::f64::consts::PI;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::coarse::Level;
 use super::curves::{column, product};
 use super::evidence::{Worth, evidence};
-use super::score::{Rows, judge};
+use super::score::{Column, Rows, judge};
 use super::search::Search;
 use super::space::Space;
 use crate::effects::{Place, Slot};
+use crate::elementary::sines_cosines;
 use crate::feature::{JointSamples, Samples};
 use crate::lie::Twist;
 use crate::machine::{Joint, JointKind, Machine};
@@ -40,6 +42,8 @@ struct Series {
     place: Place,
     motions: Vec<Motion>,
     curves: Vec<Vec<f64>>,
+    /// Whether the curves jump, which blocks of samples might hide.
+    jumps: bool,
 }
 
 /// A series that stands out.
@@ -71,11 +75,16 @@ pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Opti
     let (rows, heat) = (search.rows, search.heat);
     let field = rows.field(space);
     let one = |series: &Series| {
-        let mut columns = series.columns(rows);
-        rows.whiten(&mut columns);
+        let fine = (&*field.space, &field.left);
+        let level = series.level(rows);
+        let (space, left) = level.map_or(fine, |level| {
+            let (space, left) = rows.on_level(&field, level);
+            (space, left)
+        });
+        let columns = level.map_or_else(|| series.columns(rows), |level| series.on_blocks(rows, level));
         let mut standing = None;
         let count = columns.ncols();
-        judge(&columns.columns(0, count), &field.space, &field.left, &[0], &mut |_, gram, g| {
+        judge(&columns.columns(0, count), space, left, &[0], &mut |_, gram, g| {
             let Worth { evidence, gain, .. } = evidence(gram, g, count, heat);
             standing = Some(Standing { place: series.place, evidence, gain });
         });
@@ -86,19 +95,40 @@ pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Opti
 }
 
 impl Series {
-    /// One column for each motion and curve, times the size usual on machines.
+    /// The level on whose blocks its curves change little, the longest first.
+    fn level(&self, rows: &Rows) -> Option<usize> {
+        let follows = |level: &Level| self.curves.iter().all(|curve| level.follows(curve));
+        let levels = rows.coarse.levels();
+        (!self.jumps).then(|| levels.iter().position(follows)).flatten()
+    }
+
+    /// One whitened column for each motion and curve, times the size usual on machines.
     fn columns(&self, rows: &Rows) -> DMatrix<f64> {
-        let linear = rows.linear;
-        let mut columns = DMatrix::zeros(linear.residual.len(), self.motions.len() * self.curves.len());
-        for (m, (slot, direction)) in self.motions.iter().enumerate() {
-            let answer = rows.answer(*slot, *direction);
+        let answers = self.motions.iter().map(|(slot, direction)| rows.answer(*slot, *direction));
+        let mut columns = self.products(answers.collect(), &self.curves, &rows.linear.sample);
+        rows.whiten(&mut columns);
+        columns
+    }
+
+    /// The same on the blocks of a level.
+    fn on_blocks(&self, rows: &Rows, number: usize) -> DMatrix<f64> {
+        let level = &rows.coarse.levels()[number];
+        let answers =
+            self.motions.iter().map(|(slot, direction)| rows.coarse_answer(number, *slot, *direction));
+        let curves: Vec<Vec<f64>> = self.curves.iter().map(|curve| level.in_middles(curve)).collect();
+        self.products(answers.collect(), &curves, &level.sample)
+    }
+
+    /// Every answer times every curve; `sample`: of each row.
+    fn products(&self, answers: Vec<Column>, curves: &[Vec<f64>], sample: &[usize]) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(sample.len(), answers.len() * curves.len());
+        let of =
+            answers.iter().zip(&self.motions).flat_map(|(a, (_, d))| curves.iter().map(move |c| (a, d, c)));
+        for (mut column, (answer, direction, curve)) in columns.column_iter_mut().zip(of) {
             let turns = direction.to_array()[3..].iter().any(|w| *w != 0.0);
             let size = if turns { USUAL.1 } else { USUAL.0 };
-            for (c, curve) in self.curves.iter().enumerate() {
-                let mut column = columns.column_mut(m * self.curves.len() + c);
-                for (row, sample) in linear.sample.iter().enumerate() {
-                    column[row] = size * answer[row] * curve[*sample];
-                }
+            for ((x, answer), sample) in column.iter_mut().zip(answer.iter()).zip(sample) {
+                *x = size * answer * curve[*sample];
             }
         }
         columns
@@ -115,7 +145,8 @@ fn all(search: &Search, machine: &Machine) -> Vec<Series> {
         for other in courses.iter().filter(|other| other.joint != one.joint) {
             let (own, others) = (series(&one.along, 1, CROSSED), series(&other.along, 1, CROSSED));
             let curves = own.iter().flat_map(|a| others.iter().map(|b| product(a, b))).collect();
-            all.push(Series { place: Place::Joint(one.joint), motions: vec![one.own()], curves });
+            let (place, motions) = (Place::Joint(one.joint), vec![one.own()]);
+            all.push(Series { place, motions, curves, jumps: false });
         }
     }
     all.extend(over_time(search));
@@ -180,15 +211,15 @@ impl<'a> Course<'a> {
             }
         }
         let all = [
-            (own.clone(), series(&self.along, 1, FINE)),
-            (own.clone(), sides),
-            (own, rates.flat_map(|r| [product(&r, &r), r]).collect()),
-            (six.clone(), motion),
-            (six, vec![product(&direction, &self.along), direction]),
+            (own.clone(), series(&self.along, 1, FINE), false),
+            (own.clone(), sides, true),
+            (own, rates.flat_map(|r| [product(&r, &r), r]).collect(), true),
+            (six.clone(), motion, false),
+            (six, vec![product(&direction, &self.along), direction], true),
         ];
         let place = Place::Joint(self.joint);
-        let all = all.into_iter().filter(|(_, curves)| !curves.is_empty());
-        all.map(|(motions, curves)| Series { place, motions, curves }).collect()
+        let all = all.into_iter().filter(|(_, curves, _)| !curves.is_empty());
+        all.map(|(motions, curves, jumps)| Series { place, motions, curves, jumps }).collect()
     }
 }
 
@@ -202,7 +233,7 @@ fn over_time(search: &Search) -> Vec<Series> {
         let at = all.iter().position(|series| series.place == candidate.place).unwrap_or_else(|| {
             let orders = if candidate.place == Place::Measurement { FINE } else { COURSE };
             let curves = series(&clock, 1, orders);
-            all.push(Series { place: candidate.place, motions: Vec::new(), curves });
+            all.push(Series { place: candidate.place, motions: Vec::new(), curves, jumps: false });
             all.len() - 1
         });
         for part in candidate.coefficients.iter().flat_map(|c| &c.parts) {
@@ -217,7 +248,8 @@ fn over_time(search: &Search) -> Vec<Series> {
 
 /// `cos nπx` of what runs from 0 to 1, for these orders: any smooth function.
 fn series(x: &[f64], from: usize, to: usize) -> Vec<Vec<f64>> {
-    (from..=to).map(|n| x.iter().map(|x| (n as f64 * PI * x).cos()).collect()).collect()
+    let angles = |n: usize| x.iter().map(|x| n as f64 * PI * x).collect::<Vec<f64>>();
+    (from..=to).map(|n| sines_cosines(&angles(n)).1).collect()
 }
 
 /// From 0 to 1 over what there is, and how much that is; `None` where it stands still.

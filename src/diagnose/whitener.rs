@@ -1,5 +1,7 @@
 //! Rows that depend on the ones before them, turned into independent ones, `docs/diagnosis.md` (61).
 
+use nalgebra::DMatrix;
+
 use super::noise::Noise;
 
 /// Turns rows into independent ones of unit variance.
@@ -69,19 +71,43 @@ impl Whitener {
 
     /// A column of rows, whitened, (61); rows that are left out become 0.
     pub fn apply(&self, column: &[f64], to: &mut [f64]) {
+        self.side_by_side([column], [to]);
+    }
+
+    /// Columns of rows, whitened, in place.
+    pub fn apply_all(&self, columns: &mut DMatrix<f64>) {
+        let rows = columns.nrows().max(1);
+        let mut white = DMatrix::zeros(columns.nrows(), columns.ncols());
+        for (own, to) in columns.as_slice().chunks(4 * rows).zip(white.as_mut_slice().chunks_mut(4 * rows)) {
+            let own: Vec<&[f64]> = own.chunks(rows).collect();
+            let mut to: Vec<&mut [f64]> = to.chunks_mut(rows).collect();
+            match (&own[..], &mut to[..]) {
+                ([a, b, c, d], [to_a, to_b, to_c, to_d]) => {
+                    self.side_by_side([a, b, c, d], [to_a, to_b, to_c, to_d]);
+                }
+                (own, to) => own.iter().zip(to).for_each(|(own, to)| self.apply(own, to)),
+            }
+        }
+        *columns = white;
+    }
+
+    /// So many columns at once: each row waits for the one before, and others can be seen to meanwhile.
+    fn side_by_side<const N: usize>(&self, columns: [&[f64]; N], mut to: [&mut [f64]; N]) {
         if self.is_white {
-            return self.plain(column, to);
+            return columns.into_iter().zip(to).for_each(|(column, to)| self.plain(column, to));
         }
         let memory = self.previous.iter().zip(&self.rho).zip(&self.rounded);
         for (row, (((previous, rho), rounded), scale)) in memory.zip(&self.scale).enumerate() {
-            to[row] = match *previous {
-                NONE => scale * column[row],
-                before => {
-                    let before = before as usize;
-                    let new = to[before] * self.unscale[before];
-                    scale * (column[row] - rho * column[before] + rounded * new)
-                }
-            };
+            if *previous == NONE {
+                (0..N).for_each(|n| to[n][row] = scale * columns[n][row]);
+                continue;
+            }
+            let before = *previous as usize;
+            let kept = rounded * self.unscale[before];
+            for n in 0..N {
+                let (column, to) = (columns[n], &mut to[n]);
+                to[row] = scale * (column[row] - rho * column[before] + kept * to[before]);
+            }
         }
     }
 
@@ -160,6 +186,19 @@ mod tests {
         assert!((product(0) - 1.0).abs() < chance * 2f64.sqrt(), "{}", product(0));
         for lag in 1..20 {
             assert!(product(lag).abs() < 1.2 * chance, "{lag}: {}", product(lag));
+        }
+    }
+
+    #[test]
+    fn columns_side_by_side_are_those_of_each_alone() {
+        let (_, whitener) = noisy();
+        let columns = nalgebra::DMatrix::from_fn(ROWS, 7, |i, j| (0.1 * i as f64 * (j + 1) as f64).sin());
+        let mut white = columns.clone();
+        whitener.apply_all(&mut white);
+        for (column, white) in columns.column_iter().zip(white.column_iter()) {
+            let mut alone = vec![0.0; ROWS];
+            whitener.apply(column.as_slice(), &mut alone);
+            assert_eq!(white.as_slice(), alone);
         }
     }
 

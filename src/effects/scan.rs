@@ -4,6 +4,7 @@
 //! from the one before it by a turn of every sample, `exp(i (φ + δ)) = exp(i φ) exp(i δ)`: four multiplications instead of a sine.
 
 use super::candidate::Candidate;
+use crate::elementary::sines_cosines;
 use crate::feature::{Feature, Samples};
 
 /// Points that are turned on from one another before sines are taken anew: rounding adds up to 1e-14 or so.
@@ -18,8 +19,8 @@ struct Turn {
 }
 
 impl Turn {
-    fn of(phase: impl Iterator<Item = f64>) -> Self {
-        let (sine, cosine) = phase.map(f64::sin_cos).unzip();
+    fn of(phase: &[f64]) -> Self {
+        let (sine, cosine) = sines_cosines(phase);
         Turn { sine, cosine }
     }
 
@@ -44,7 +45,7 @@ impl Candidate {
         let waves = self.waves();
         let mut columns = vec![Vec::new(); self.features.len()];
         for wave in &waves {
-            let turn = Turn::of(wave.phase.over(stretches, parameters).into_iter());
+            let turn = Turn::of(&wave.phase.over(stretches, parameters));
             for (i, cosine) in &wave.members {
                 columns[*i].clone_from(if *cosine { &turn.cosine } else { &turn.sine });
             }
@@ -91,7 +92,7 @@ impl Candidate {
                             &*now
                         }
                         None => {
-                            fresh = Turn::of(wave.phase.over(stretches, point).into_iter());
+                            fresh = Turn::of(&wave.phase.over(stretches, point));
                             &fresh
                         }
                     };
@@ -115,6 +116,6 @@ fn start(phase: &Feature, stretches: &[Samples], points: &[Vec<f64>]) -> Option<
     let even = (first.iter().zip(&second).zip(&last))
         .all(|((a, b), z)| ((z - a) - steps * (b - a)).abs() <= EQUAL * steps);
     // The step from the whole block keeps rounding of a single one from adding up.
-    let step = first.iter().zip(&last).map(|(a, z)| (z - a) / steps);
-    even.then(|| (Turn::of(first.iter().copied()), Turn::of(step)))
+    let step: Vec<f64> = first.iter().zip(&last).map(|(a, z)| (z - a) / steps).collect();
+    even.then(|| (Turn::of(&first), Turn::of(&step)))
 }

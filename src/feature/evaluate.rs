@@ -218,7 +218,21 @@ impl<S: Scalar> Pass<'_, S> {
             }
             Node::Function(f, e) => {
                 let f = *f;
-                self.evaluate(e).map(|x| function(f, x))
+                match (f, self.evaluate(e)) {
+                    (Function::Sin, Value::Column(column)) => Value::Column(S::sin_cos_all(&column).0),
+                    (Function::Cos, Value::Column(column)) => Value::Column(S::sin_cos_all(&column).1),
+                    (Function::Exp, Value::Column(mut column)) => {
+                        column.iter_mut().for_each(|x| *x = not_far_down(*x));
+                        S::exp_all(&mut column);
+                        Value::Column(column)
+                    }
+                    (Function::Bump, Value::Column(mut column)) => {
+                        column.iter_mut().for_each(|x| *x = not_far_down((*x * *x).scale(-0.5)));
+                        S::exp_all(&mut column);
+                        Value::Column(column)
+                    }
+                    (_, value) => value.map(|x| function(f, x)),
+                }
             }
             Node::Chebyshev(order, e) => {
                 let order = *order;
@@ -345,9 +359,10 @@ fn clip<S: Scalar>(x: S) -> S {
     x.select_below(0.0, x.lift(0.0), x)
 }
 
-/// Exponential; far down, where it is nothing to anything, it stays what it is: numbers near underflow are slow.
-fn vanishing<S: Scalar>(x: S) -> S {
-    x.select_below(-200.0, x.lift(-200.0), x).exp()
+/// Far down, where its exponential is nothing to anything, it stays what it is: numbers near underflow are slow.
+#[inline(always)]
+fn not_far_down<S: Scalar>(x: S) -> S {
+    x.select_below(-200.0, x.lift(-200.0), x)
 }
 
 #[inline(always)]
@@ -356,13 +371,13 @@ fn function<S: Scalar>(f: Function, x: S) -> S {
     match f {
         Function::Sin => x.sin_cos().0,
         Function::Cos => x.sin_cos().1,
-        Function::Exp => vanishing(x),
+        Function::Exp => not_far_down(x).exp(),
         Function::Abs => x.select_below(0.0, -x, x),
         Function::Sign => x.select_below(0.0, number(-1.0), (-x).select_below(0.0, number(1.0), number(0.0))),
         Function::Positive => clip(x),
         Function::Step => x.select_below(0.0, number(0.0), number(1.0)),
         Function::Saturate => x * (x * x).offset(1.0).sqrt().recip(),
-        Function::Bump => vanishing((x * x).scale(-0.5)),
+        Function::Bump => not_far_down((x * x).scale(-0.5)).exp(),
     }
 }
 
