@@ -27,6 +27,7 @@ mod outliers;
 mod panel;
 mod passing;
 mod placebo;
+mod polish;
 mod reach;
 mod refine;
 mod report;
@@ -163,12 +164,12 @@ pub fn diagnose(
         if round == NOISE_ROUNDS || is_settled(&judged) {
             let heat = search.leftover(&search.beside(&active, None)).heat;
             if heat < HOT {
-                let active = folds::useful(&search, &active, most_wild);
+                let active = search.polished(&folds::useful(&search, &active, most_wild));
                 return Ok(report(&search, &active));
             }
             // Much is left, as it always is on real machines: the simplest names that stand out from it count.
             let search = Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
-            active = folds::useful(&search, &search.run(&active, |_| true), most_wild);
+            active = search.polished(&folds::useful(&search, &search.run(&active, |_| true), most_wild));
             return Ok(report(&search, &active));
         }
         (noise, round) = (judged, round + 1);

@@ -10,6 +10,9 @@ use kincal::recording::Recording;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
+/// Periods of which the errors are compared with what is said of them.
+const DRAWS: u32 = 40;
+
 /// Noise of unit variance; the sum of four even numbers is near enough to normal.
 fn normals(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed | 1;
@@ -84,4 +87,23 @@ proptest! {
         let machine = common::machine("linear_axis");
         is_told(&machine, targets(&machine, period, phase, seed), period)?;
     }
+}
+
+#[test]
+fn periods_are_off_by_as_much_as_is_said() {
+    let machine = common::machine("linear_axis");
+    let off = |k: u32| {
+        let period = 6.0 + 0.731 * f64::from(k);
+        let recording = recording(&machine, period, 0.9 * f64::from(k), 77 + 13 * u64::from(k));
+        let said = diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {});
+        let said = said.unwrap_or_else(|e| panic!("{e}"));
+        let [finding] = &said.findings[..] else { panic!("{period} mm: {:?}", said.findings) };
+        let found = finding.coefficients.iter().find(|c| c.name == "period").expect("a period");
+        (found.value - 1e-3 * period) / found.std_error
+    };
+    let squares: Vec<f64> = (0..DRAWS).map(|k| off(k).powi(2)).collect();
+    let mean = squares.iter().sum::<f64>() / f64::from(DRAWS);
+    // Three standard deviations of a mean square about one.
+    let chance = 3.0 * (2.0 / f64::from(DRAWS)).sqrt();
+    assert!((mean - 1.0).abs() < chance, "{mean}: {squares:?}");
 }

@@ -104,7 +104,7 @@ impl Search<'_> {
     }
 
     /// Gram matrix of columns beside a space, and what leads from them to the residuals.
-    fn normal(&self, columns: &DMatrix<f64>, space: &Space) -> (DMatrix<f64>, DVector<f64>) {
+    pub(super) fn normal(&self, columns: &DMatrix<f64>, space: &Space) -> (DMatrix<f64>, DVector<f64>) {
         let along = space.along(&columns.as_view());
         let gram = columns.tr_mul(columns) - along.tr_mul(&along);
         (gram, columns.tr_mul(&space.apply(&self.rows.residual)))
@@ -112,7 +112,7 @@ impl Search<'_> {
 }
 
 /// Coefficients from normal equations, with their prior.
-fn solved(mut gram: DMatrix<f64>, toward: &DVector<f64>) -> Option<DVector<f64>> {
+pub(super) fn solved(mut gram: DMatrix<f64>, toward: &DVector<f64>) -> Option<DVector<f64>> {
     (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
     Some(gram.cholesky()?.solve(toward))
 }

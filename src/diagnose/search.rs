@@ -56,7 +56,7 @@ impl Active {
     }
 
     /// In the place of another.
-    fn instead_of(self, other: &Active) -> Active {
+    pub(super) fn instead_of(self, other: &Active) -> Active {
         Active { near: other.near.clone(), hidden: other.hidden, ..self }
     }
 }
