@@ -46,7 +46,7 @@ mod waves;
 mod whereabouts;
 mod whitener;
 
-pub use approaches::StandsStill;
+pub use approaches::{SaidBy, StandsStill};
 pub use companions::Companion;
 pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
 pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};
@@ -211,7 +211,7 @@ fn noise_of(
             return noise;
         }
         match !smooth && facts.time.is_some() && noise::without_order(linear) {
-            true => noise::remembered(left, &own, out),
+            true => noise::remembered(left, &own, out, linear.step(angle)),
             false => noise::estimate(left, &own, out, smooth, linear.step(angle)),
         }
     };

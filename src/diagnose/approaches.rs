@@ -17,9 +17,21 @@ pub struct StandsStill {
     pub at: String,
     /// The side from which it came there, as the readings say: 1 rising, -1 falling.
     pub direction: i8,
+    /// What would say so in the recording itself; `None` where the joint follows several commands.
+    #[serde(flatten)]
+    pub said_by: Option<SaidBy>,
     /// Where that is, by recording and dyad.
     #[serde(skip)]
     pub(super) approach: Approach,
+}
+
+/// A column that says from which side a joint came.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SaidBy {
+    /// Its heading, `<command>_direction[1]`.
+    pub column: String,
+    /// Its value in every row, 1 or -1.
+    pub value: i8,
 }
 
 /// Sides of approach of all joints that stand still, and have an effect that depends on it. What was found of how the effect was before
@@ -62,14 +74,23 @@ pub(super) fn approaches(search: &Search, kept: &[Active], machine: &Machine) ->
     let told = votes.into_iter().filter_map(|(recording, dyad, product, square)| {
         let direction = (product / square).round().clamp(-1.0, 1.0);
         let at = machine.dyads()[dyad].joint.as_ref()?.name.clone();
-        (direction.abs() == 1.0).then(|| StandsStill {
+        let direction = direction as i8;
+        (direction != 0).then(|| StandsStill {
             recording: linear.spans[recording].label.clone(),
             at,
-            direction: direction as i8,
-            approach: Approach { recording, dyad, direction: direction as i8 },
+            direction,
+            said_by: said_by(machine, dyad, direction),
+            approach: Approach { recording, dyad, direction },
         })
     });
     told.collect()
+}
+
+fn said_by(machine: &Machine, dyad: usize, direction: i8) -> Option<SaidBy> {
+    let [(command, factor)] = machine.drive(dyad)?.terms.as_slice() else { return None };
+    let value = if *factor < 0.0 { -direction } else { direction };
+    (*factor != 0.0)
+        .then(|| SaidBy { column: format!("{}_direction[1]", machine.commands()[*command]), value })
 }
 
 /// What effect `i` does to every row over these samples, m or rad.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::diagnosis::Named;
 use super::held_out::Model;
 use super::search::{Active, Rival, Search};
-use crate::effects::{Identified, Library};
+use crate::effects::Library;
 use crate::machine::Machine;
 
 /// A joint that has an effect of the findings too, so little that it is no finding; the model has it.
@@ -49,13 +49,7 @@ pub(super) fn named(
     let one = |(i, effect): (usize, &Active)| {
         let candidate = &search.candidates[effect.candidate];
         let solved = model.effect(search, &all, kept.len() + i, 0.0);
-        let identified = Identified {
-            family: &library.families()[candidate.family],
-            candidate,
-            coefficients: solved.coefficients,
-            parameters: effect.score.parameters.clone(),
-            covariance: Some(solved.covariance),
-        };
+        let identified = solved.identified(candidate, library, effect.score.parameters.clone());
         let sizes = identified.sizes(&search.rows.linear.samples);
         Named { effect: identified.stored(machine, &sizes), scales: effect.scales(search) }
     };

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::search::{Active, Search};
 use super::space::gram;
-use crate::effects::Candidate;
+use crate::effects::{Candidate, Identified, Library};
 
 /// Constant deviations and effects solved together.
 pub(super) struct Model {
@@ -28,6 +28,24 @@ pub(super) struct Solved {
     pub coefficients: Vec<f64>,
     /// Coefficients before parameters.
     pub covariance: Vec<Vec<f64>>,
+}
+
+impl Solved {
+    /// As an effect of its family, at these parameters.
+    pub fn identified<'a>(
+        self,
+        candidate: &'a Candidate,
+        library: &'a Library,
+        parameters: Vec<f64>,
+    ) -> Identified<'a> {
+        Identified {
+            family: &library.families()[candidate.family],
+            candidate,
+            coefficients: self.coefficients,
+            parameters,
+            covariance: Some(self.covariance),
+        }
+    }
 }
 
 impl Model {

@@ -171,11 +171,12 @@ fn structure(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], lag: usize) -
     Some(mean)
 }
 
-/// Correlation of neighbouring readings, as they are, less what rounding (its variance) adds to each.
-fn neighbours(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], rounding: f64) -> f64 {
+/// Correlation of readings so many apart, as they are, less what rounding (its variance) adds to each.
+fn neighbours(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], rounding: f64, lag: usize) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
-    for pair in runs.iter().flat_map(|run| run.windows(2)).filter(|pair| !out[pair[0]] && !out[pair[1]]) {
-        let (a, b) = (residual[pair[0]], residual[pair[1]]);
+    let pairs = runs.iter().flat_map(|run| run.iter().zip(run.iter().skip(lag)));
+    for (first, second) in pairs.filter(|(first, second)| !out[**first] && !out[**second]) {
+        let (a, b) = (residual[*first], residual[*second]);
         products += a * b;
         squares += 0.5 * (a * a + b * b) - rounding;
     }
@@ -209,7 +210,7 @@ pub(super) fn estimate(
     let by_three = 0.5 * ((1.0 + 4.0 * ratio).sqrt() - 1.0);
     let least = by_two.min(by_three);
     // Where that comes to nearly the same, neighbours as they are say it most exactly.
-    let direct = neighbours(residual, runs, out, rounding);
+    let direct = neighbours(residual, runs, out, rounding, 1);
     let rho = if (direct - least).abs() < ALIKE { direct } else { least }.clamp(0.0, MOST_RHO);
     let rho = if rho < 0.03 { 0.0 } else { rho };
     let sigma2 = rounding + if rho == 0.0 { one } else { one / (1.0 - rho) };
@@ -222,6 +223,8 @@ const NO_ORDER: f64 = 0.3;
 /// So many readings tell whether noise is remembered from one position to the next, beyond so many standard deviations of chance.
 const POSITIONS: usize = 40;
 const REMEMBERED: f64 = 2.5;
+/// Memory that lasts longer than it begins to, by so many standard deviations of the second partial correlation, is a misfit.
+const LASTING: f64 = 5.0;
 
 /// Whether settled positions follow each other without order, so that what neighbours have in common is no misfit of the machine.
 pub(super) fn without_order(linear: &Linear) -> bool {
@@ -238,13 +241,21 @@ pub(super) fn without_order(linear: &Linear) -> bool {
     (0..joints).all(|j| alike(j) < NO_ORDER)
 }
 
-/// Noise of settled positions without order: what is left, and what neighbours have in common.
-pub(super) fn remembered(residual: &[f64], runs: &[&Vec<usize>], out: &[bool]) -> Noise {
+/// Noise of settled positions without order: what is left, and what neighbours have in common. `step`: of the readings, m or rad.
+pub(super) fn remembered(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], step: f64) -> Noise {
     let noise = estimate(residual, runs, out, false, 0.0);
+    let rounding = (step * step / 12.0).min(MOST_ROUNDED * noise.sigma.powi(2));
     let count = runs.iter().flat_map(|run| run.iter()).filter(|row| !out[**row]).count();
-    let rho = neighbours(residual, runs, out, 0.0);
-    let is_chance = count < POSITIONS || rho * (count as f64).sqrt() < REMEMBERED;
-    Noise { rho: if is_chance { 0.0 } else { rho.min(MOST_RHO) }, ..noise }
+    let [one, two] = [1, 2].map(|lag| neighbours(residual, runs, out, rounding, lag));
+    let is_chance = count < POSITIONS || one * (count as f64).sqrt() < REMEMBERED;
+    if is_chance {
+        return noise;
+    }
+    // What noise remembers over two readings is the square of what it does over one. What lasts longer than that begins to is no noise,
+    // and by (60) it adds nothing to the difference that the second reading makes.
+    let lasts = (two - one * one) / (1.0 - one * one) * (count as f64).sqrt() > LASTING;
+    let rho = if lasts { ((one - two) / (1.0 - one)).clamp(0.0, one) } else { one };
+    Noise { rho: rho.min(MOST_RHO), rounding: rounding.sqrt(), ..noise }
 }
 
 /// So many differences within groups of repeated approaches say what the noise is.

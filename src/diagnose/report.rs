@@ -19,7 +19,7 @@ use super::stretch::wheres;
 use super::traces::{self, Traces};
 use super::unexplained::{self, Unexplained};
 use super::whereabouts::{standing, whereabouts};
-use crate::effects::{Identified, Library, Place, in_words};
+use crate::effects::{Library, Place, in_words};
 use crate::feature::Dimension;
 use crate::machine::Machine;
 
@@ -227,13 +227,7 @@ fn finding(
         let own = solved.coefficients.len() + p;
         solved.covariance[own][own] = deviation * deviation;
     }
-    let identified = Identified {
-        family,
-        candidate,
-        coefficients: solved.coefficients,
-        parameters,
-        covariance: Some(solved.covariance),
-    };
+    let identified = solved.identified(candidate, library, parameters);
     let sizes = identified.sizes(&search.rows.linear.samples);
     let named = Named { effect: identified.stored(machine, &sizes), scales: effect.scales(search) };
     let mut confusable_with: Vec<Confusable> = Vec::new();

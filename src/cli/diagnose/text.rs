@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use kincal::diagnose::{
-    Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, StandsStill,
-    Unexplained, Where,
+    Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, SaidBy,
+    StandsStill, Unexplained, Where,
 };
 use kincal::effects::in_words;
 use kincal::feature::Dimension;
@@ -68,11 +68,13 @@ pub(crate) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
             "the model has a small {effect} of {places} too: what comes anew with every set-up hardly does so at one place alone"
         )
     };
-    let still = |StandsStill { recording, at, direction, .. }: &StandsStill| {
+    let still = |StandsStill { recording, at, direction, said_by, .. }: &StandsStill| {
         let side = if *direction > 0 { "rising" } else { "falling" };
+        let hint = said_by.as_ref().map_or_else(String::new, |SaidBy { column, value }| {
+            format!("; a column {column} of {value} would say so too")
+        });
         format!(
-            "{at} stands still all through {recording}, where the readings say that it came there {side}; \
-             a column {at}_direction[1] of {direction} would say so too"
+            "{at} stands still all through {recording}, where the readings say that it came there {side}{hint}"
         )
     };
     by_effect.into_iter().map(one).chain(diagnosis.stand_still.iter().map(still)).collect()
