@@ -304,3 +304,51 @@ pub(super) fn repeated(
         rounding: 0.0,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    const COUNT: usize = 3000;
+    const STEP: f64 = 1.2e-5;
+
+    /// Memory of readings at settled positions: each `of` what was before and a new normal number, rounded.
+    fn memory(mut of: impl FnMut(f64, f64) -> (f64, f64)) -> f64 {
+        let mut random = rand::rngs::StdRng::seed_from_u64(5);
+        let mut before = 0.0;
+        let readings: Vec<f64> = (0..COUNT)
+            .map(|_| {
+                let normal = (0..12).map(|_| random.random_range(-0.5..0.5)).sum::<f64>();
+                let read;
+                (before, read) = of(before, normal);
+                (1e-5 * read / STEP).round() * STEP
+            })
+            .collect();
+        let run: Vec<usize> = (0..COUNT).collect();
+        remembered(&readings, &[&run], &[false; COUNT], STEP).rho
+    }
+
+    #[test]
+    fn noise_that_remembers_is_told_from_its_rounding() {
+        for rho in [0.3, 0.6, 0.9] {
+            let found = memory(|before, normal| {
+                let now = rho * before + (1.0f64 - rho * rho).sqrt() * normal;
+                (now, now)
+            });
+            assert!((found - rho).abs() < 0.08, "{rho}: {found}");
+        }
+    }
+
+    #[test]
+    fn what_lasts_longer_than_it_begins_to_is_no_memory() {
+        let mut count = 0u32;
+        let found = memory(|before, normal| {
+            count += 1;
+            let side = if before == 0.0 { 1.0 } else { before };
+            let now = if count.is_multiple_of(23) || count.is_multiple_of(31) { -side } else { side };
+            (now, now + normal)
+        });
+        assert!(found < 0.1, "{found}");
+    }
+}

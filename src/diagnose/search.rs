@@ -261,7 +261,8 @@ impl Search<'_> {
     /// what was found before may be off by.
     ///
     /// `from`: what had been found under another noise. `holds`: whether the noise is still what it is searched with; where nothing had been
-    /// found and the first effect changes it, everything else is left to the search with the noise that is left.
+    /// found and the first effect changes it, everything else is left to the search with the noise that is left. Among settled positions noise
+    /// is what is left, and less of it with every effect: there all are judged by the same.
     pub fn run(&self, from: &[Active], holds: impl Fn(&[Active]) -> bool) -> Vec<Active> {
         let mut active: Vec<Active> = Vec::new();
         for effect in from {
@@ -286,7 +287,7 @@ impl Search<'_> {
             (self.progress)(&format!("looking for effect {}", active.len() + 1));
             let Some(entered) = self.next(&active) else { break };
             active.push(entered);
-            if from.is_empty() && active.len() == 1 && !holds(&active) {
+            if self.in_motion && from.is_empty() && active.len() == 1 && !holds(&active) {
                 return active;
             }
             if active.len() > 1 {
