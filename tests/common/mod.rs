@@ -28,6 +28,15 @@ pub fn machine(stem: &str) -> Machine {
     machines().into_iter().find(|(name, _)| name == stem).unwrap_or_else(|| panic!("{stem} is shipped")).1
 }
 
+/// Columns of `f64` have sines and exponentials of their own, to a few units in the last place of one; dual numbers those of the standard library.
+pub fn are_the_same_but_for_rounding(one: &[f64], other: &[f64]) {
+    assert_eq!(one.len(), other.len());
+    let largest = one.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    for (a, b) in one.iter().zip(other) {
+        assert!((a - b).abs() <= 1e-15 + 1e-14 * largest, "{a} {b}, largest {largest}");
+    }
+}
+
 /// A file of the folder beside the project; `None`, with a message, where it is missing.
 pub fn shared(path: &str) -> Option<PathBuf> {
     let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
