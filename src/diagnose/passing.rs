@@ -2,9 +2,8 @@
 
 use pulp::Arch;
 
-/// Of more frequencies than a few, the energy is asked at so many and one.
+/// The energy is asked at so many frequencies and one.
 const KNOTS: usize = 1000;
-const FEW: usize = 64;
 /// Knots that are turned on from one another before sines are taken anew.
 const TURNED: usize = 64;
 
@@ -18,22 +17,8 @@ pub(super) struct Passed {
     pub advance: f64,
 }
 
-impl Passed {
-    /// Energy that is left when the wave comes on by this angle from row to row.
-    fn of(&self, angle: f64) -> f64 {
-        let passes = |part: f64| 1.0 + part * part - 2.0 * part * angle.cos();
-        self.energy * passes(self.rho) / passes(self.rounded)
-    }
-}
-
 /// Adds the energy of these rows, and a constant, at every factor of the phase.
 pub(super) fn add_energies(rows: &[Passed], constant: f64, factors: &[f64], energies: &mut [f64]) {
-    if rows.is_empty() || factors.len() <= FEW {
-        for (sum, factor) in energies.iter_mut().zip(factors) {
-            *sum += constant + rows.iter().map(|row| row.of(factor * row.advance)).sum::<f64>();
-        }
-        return;
-    }
     // It changes as slowly with the factor as the phase advances from row to row: even knots are enough.
     let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
     let high = factors.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -123,10 +108,14 @@ mod tests {
         };
         let rows: Vec<Passed> = (0..203).map(row).collect();
         let factors: Vec<f64> = (0..5000).map(|k| 20.0 + 0.37 * f64::from(k)).collect();
+        let of = |row: &Passed, factor: f64| {
+            let passes = |part: f64| 1.0 + part * part - 2.0 * part * (factor * row.advance).cos();
+            row.energy * passes(row.rho) / passes(row.rounded)
+        };
         let mut energies = vec![1.0; factors.len()];
         add_energies(&rows, 2.0, &factors, &mut energies);
         for (factor, energy) in factors.iter().zip(energies) {
-            let exact = 3.0 + rows.iter().map(|row| row.of(factor * row.advance)).sum::<f64>();
+            let exact = 3.0 + rows.iter().map(|row| of(row, *factor)).sum::<f64>();
             assert!((energy / exact - 1.0).abs() < 1e-4, "{factor}: {energy} {exact}");
         }
     }

@@ -216,7 +216,9 @@ impl<'a> Rows<'a> {
         if candidate.coefficients.is_empty() {
             return None;
         }
-        if let Some(gains) = self.harmonics(i, candidate, field).filter(|_| all.len() > WAVES) {
+        if all.len() > WAVES
+            && let Some(gains) = self.harmonics(i, candidate, field)
+        {
             // Far from a line there is next to nothing: evidence of no gain.
             let none = -(candidate.coefficients.len() as f64);
             let peaks = peaks(&gains);
