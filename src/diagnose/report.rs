@@ -159,7 +159,7 @@ fn doubt(
     let (left, total) = (&shares.left, shares.total());
     let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
     let memory = noise.iter().map(Noise::memory).fold(1.0, f64::max);
-    let patched = search.patched(active);
+    let patched = search.patched(active).or_else(|| search.wandering(active));
     // What sounds does so louder and softer, and hardly ever at quite one frequency.
     let wanders = active.iter().any(|effect| search.is_tone(effect.candidate));
     let is_unexplained = patched.is_some()

@@ -22,6 +22,11 @@ const SHAPE: f64 = 0.35;
 const UNLIKE: f64 = 0.1;
 const CHANCE: f64 = 3.0;
 
+/// Frequencies nearer than so many turns in the time seen belong to one line.
+const NEAR: f64 = 32.0;
+/// The strongest of them has at least this part of their energy if the line is steady.
+const STEADY: f64 = 0.5;
+
 /// So many functions of where a joint stands may be found at one joint.
 const PATCHES: usize = 2;
 
@@ -74,6 +79,27 @@ impl Search<'_> {
     /// Whether it is a wave in time: noise whose colour is not quite known has many.
     pub fn is_tone(&self, candidate: usize) -> bool {
         self.candidates[candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
+    }
+
+    /// The place of tones that are so near to one another that they are one, and none of them stands for it: what wanders has no frequency.
+    pub fn wandering(&self, active: &[Active]) -> Option<Place> {
+        let times = || self.rows.linear.samples.iter().filter_map(|s| s.time.as_ref()).flatten();
+        let seen = times().copied().fold(f64::NEG_INFINITY, f64::max)
+            - times().copied().fold(f64::INFINITY, f64::min);
+        let mut tones: Vec<(f64, f64, Place)> = (active.iter())
+            .filter_map(|effect| {
+                let candidate = &self.candidates[effect.candidate];
+                let frequency = candidate.frequency(&effect.score.parameters)?;
+                Some((frequency, effect.score.gain, candidate.place))
+            })
+            .collect();
+        tones.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let lines = tones.chunk_by(|a, b| (b.0 - a.0) * seen < NEAR && a.2 == b.2);
+        let wanders = |line: &&[(f64, f64, Place)]| {
+            let strongest = line.iter().map(|tone| tone.1).fold(0.0, f64::max);
+            strongest < STEADY * line.iter().map(|tone| tone.1).sum::<f64>()
+        };
+        lines.into_iter().find(wanders).map(|line| line[0].2)
     }
 
     /// Whether it happens at one moment of the recordings, or from one sample on.

@@ -349,6 +349,11 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
             let (from, to) = b.time.filter(|(from, to)| to > from).ok_or(Unbound::NoTime)?;
             Node::Between(Box::new(Node::Time(from)), 0.0, to - from)
         }
+        E::Beyond => {
+            let (from, to) = b.time.filter(|(from, to)| to > from).ok_or(Unbound::NoTime)?;
+            let halves = Node::Quotient(Box::new([Node::Time(to), Node::Number(0.5 * (to - from))]));
+            Node::Function(Function::Positive, Box::new(halves))
+        }
         E::Channel(name, unit) => {
             let joint = b.own.and_then(|j| b.machine.dyads()[j].joint.as_ref());
             if name.contains("{at}") && joint.is_none() {

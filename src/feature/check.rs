@@ -73,7 +73,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
         Err(f)
     };
     match expression {
-        Number(_) | Clock | Order | Beginning | OrderIn(_) | BeginningIn(_) => Ok(Dimension::ONE),
+        Number(_) | Clock | Beyond | Order | Beginning | OrderIn(_) | BeginningIn(_) => Ok(Dimension::ONE),
         Value(_, symbol) | Channel(_, symbol) => match Unit::named(symbol) {
             Some(unit) => Ok(Dimension::of_quantity(unit.quantity)),
             None => Err(fault(format!("\"{symbol}\" is no unit"), "write a unit such as mm, deg, s, degC")),

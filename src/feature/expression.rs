@@ -44,6 +44,8 @@ pub enum Expression {
     Time,
     /// Where the time stands within the time seen, from -1 to 1.
     Clock,
+    /// By how much the time is beyond the time seen, in halves of it; 0 until then.
+    Beyond,
     /// Number of samples before this one, in all recordings in their order.
     Order,
     /// The same of the first sample of its recording.
@@ -137,8 +139,8 @@ impl Expression {
             | TakeUp(e) => vec![(&**e, "[0]".into())],
             Number(_) | Value(..) | Parameter(_) | Position | Stroke | Direction | Velocity
             | Acceleration | SinceReversal | Travelled | Gravity | Load | Moment(_) | Shear(_)
-            | Lever(..) | Time | Clock | Order | Beginning | Channel(..) | TimeSince(_) | OrderIn(_)
-            | BeginningIn(_) => Vec::new(),
+            | Lever(..) | Time | Clock | Beyond | Order | Beginning | Channel(..) | TimeSince(_)
+            | OrderIn(_) | BeginningIn(_) => Vec::new(),
         }
     }
 

@@ -76,6 +76,7 @@ fn write(e: &Expression, f: &mut fmt::Formatter<'_>, at_least: u8, mark: &str) -
         Shear(n) => name(f, &format!("Q{n}")),
         Lever(k, n) => name(f, &format!("λ{k}{n}")),
         Clock => f.write_str("u"),
+        Beyond => f.write_str("u₊"),
         Order | OrderIn(_) => f.write_str("n"),
         Beginning | BeginningIn(_) => f.write_str("n₀"),
         Channel(channel, _) => f.write_str(channel),
