@@ -7,6 +7,7 @@ mod compensate;
 mod demo;
 mod describe;
 mod diagnose;
+mod join;
 mod location;
 mod output;
 mod predict;
@@ -36,6 +37,8 @@ enum Command {
     Compare(compare::Args),
     /// What a calibrated machine says the instrument would read, sample by sample
     Predict(predict::Args),
+    /// A recording with the columns of another one of the same moments beside its own
+    Join(join::Args),
     /// Locates what a model leaves over, names the physics left out, and models it
     Diagnose(diagnose::Args),
     /// The NC program with corrected axis words, everything else as it was
@@ -65,6 +68,7 @@ pub(crate) fn run() -> ExitCode {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Predict(args) => predict::run(&args),
+        Command::Join(args) => join::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Compensate(args) => compensate::run(&args),
         Command::Simulate(args) => simulate::run(&args),

@@ -9,7 +9,7 @@ use crate::chain::Chain;
 use crate::check::random_command;
 use crate::identify::COMPONENTS;
 use crate::lie::{Mat3, Vec3};
-use crate::machine::{Branch, Joint, JointKind, Machine};
+use crate::machine::{Branch, Dyad, Joint, JointKind, Machine};
 use crate::sensor::{Sensor, SensorState};
 
 /// Everything that `describe` prints. Numbers in SI.
@@ -20,7 +20,7 @@ pub struct Description {
     /// What it is, if the file says so.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub about: Option<String>,
-    /// Branches as one line each, from the base outwards.
+    /// Branches as one line each, from the base outwards, then side branches from what carries them.
     pub topology: Vec<String>,
     /// The model equation in symbols, one line each.
     pub equation: Vec<String>,
@@ -76,15 +76,17 @@ pub fn describe(machine: &Machine) -> Description {
         let own = (0..machine.dyads().len()).filter(move |j| machine.branch(*j) == branch);
         own.map(|j| &machine.dyads()[j])
     };
-    let topology = [Branch::Workpiece, Branch::Tool].map(|b| {
-        let names: Vec<String> = branch(b)
-            .map(|d| match &d.joint {
-                Some(joint) => format!("{} [{}]", d.frame, joint_symbol(joint)),
-                None => d.frame.clone(),
-            })
-            .collect();
-        format!("base -> {}", names.join(" -> "))
-    });
+    let line = |from: &str, dyads: &mut dyn Iterator<Item = &Dyad>| {
+        let name = |d: &Dyad| match &d.joint {
+            Some(joint) => format!("{} [{}]", d.frame, joint_symbol(joint)),
+            None => d.frame.clone(),
+        };
+        let names: Vec<String> = std::iter::once(from.to_string()).chain(dyads.map(name)).collect();
+        names.join(" -> ")
+    };
+    let branches = [Branch::Workpiece, Branch::Tool].map(|b| line("base", &mut branch(b)));
+    let sides = machine.side_branches().iter().map(|side| line(&side.on, &mut side.dyads.iter()));
+    let topology = branches.into_iter().chain(sides).collect();
     let product = |b: Branch| {
         let factors: Vec<String> = branch(b)
             .map(|d| {
@@ -105,7 +107,7 @@ pub fn describe(machine: &Machine) -> Description {
     Description {
         machine: machine.name().into(),
         about: machine.about().map(Into::into),
-        topology: topology.to_vec(),
+        topology,
         equation: vec![
             format!("b_from_w = {}", product(Branch::Workpiece)),
             format!("b_from_t = {}", product(Branch::Tool)),

@@ -36,6 +36,7 @@ mod search;
 mod set_ups;
 mod shape;
 mod shares;
+mod side_branches;
 mod space;
 mod spectrum;
 mod speeds;
@@ -53,6 +54,7 @@ pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};
 pub use not_tried::NotTried;
 pub use outliers::{Outliers, WithoutOutliers};
 pub use set_ups::{LeftOutRms, SetUpLeftOut};
+pub use side_branches::UnseenSideBranch;
 pub use stretch::Where;
 pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
 pub use unexplained::{Gathering, Unexplained};
@@ -62,6 +64,7 @@ use std::collections::HashMap;
 
 use crate::effects::{Candidate, Library, RecordingFacts};
 use crate::error::Result;
+use crate::feature::as_seen_in;
 use crate::identify::{Linear, Options, linear};
 use crate::machine::Machine;
 use crate::recording::Recording;
@@ -70,6 +73,7 @@ use noise::Noise;
 use not_tried::not_tried;
 use score::Rows;
 use search::{Active, Search};
+use side_branches::unseen;
 use whitener::Whitener;
 
 /// What a diagnosis is asked.
@@ -102,6 +106,7 @@ pub fn diagnose(
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis> {
     progress("fitting constant geometry");
+    let (whole, machine) = (machine, &as_seen_in(machine, recordings));
     let facts = RecordingFacts::of(machine, recordings)?;
     let mut linear = linear(machine, recordings, request.options, &facts.dead_bands, progress)?;
     let candidates = library.candidates(machine, &facts);
@@ -144,6 +149,7 @@ pub fn diagnose(
         let report = |search: &Search, active: &[Active]| -> Diagnosis {
             let mut diagnosis = report::report(search, active, machine, library, &noise);
             diagnosis.not_tried = not_tried(&candidates);
+            diagnosis.unseen_side_branches = unseen(whole, machine);
             diagnosis
         };
         if moves < MOVES && !active.is_empty() {

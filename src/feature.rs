@@ -28,4 +28,4 @@ pub use evaluate::Memory;
 pub use expression::Expression;
 pub use samples::{Follow, FollowOptions, JointSamples, Samples, first_directions, samples_of};
 pub(crate) use walk::Walk;
-pub use weights::gravity_of;
+pub use weights::{as_seen_in, gravity_of};

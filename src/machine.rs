@@ -8,12 +8,14 @@ mod dyad;
 mod fault;
 mod form;
 mod read;
+mod side;
 mod write;
 
 pub use dyad::{Dyad, Joint, JointKind, MassPoint, NcWord, Placement, Tolerance};
 pub use fault::MachineFault;
 pub(crate) use form::{AngleUnit, LengthUnit, MachineForm, UnitsForm};
 pub(crate) use read::at_path;
+pub use side::SideBranch;
 pub(crate) use write::{in_unit, to_text};
 
 use crate::lie::Vec3;
@@ -96,6 +98,7 @@ pub struct Machine {
     workpiece_count: usize,
     commands: Vec<String>,
     drives: Vec<Option<Drive>>,
+    side_branches: Vec<SideBranch>,
 }
 
 impl Machine {
@@ -121,6 +124,7 @@ impl Machine {
             workpiece_count,
             commands: Vec::new(),
             drives: Vec::new(),
+            side_branches: Vec::new(),
         };
         machine.check()?;
         Ok(machine)

@@ -155,7 +155,8 @@ fn zeros_of_one_axis_that_come_anew_bring_those_of_the_others_into_the_model() {
     let joint = |i: usize| machine.commands()[i].clone();
     assert_eq!(names(&said), [("homing_error", joint(1).as_str())]);
     let companions = said.companions.clone();
-    let comes_along = |at: String| companions.contains(&Companion { effect: "homing_error".into(), at });
+    let comes_along =
+        |at: String| companions.contains(&Companion { effect: "homing_error".into(), at, of_set_up: true });
     assert!(comes_along(joint(2)) && !comes_along(joint(1)), "{companions:?}");
 
     // The file has them, and a new set-up finds all of them again.

@@ -1,4 +1,5 @@
-//! What comes anew with every set-up comes so at several joints: axes are referenced together, `docs/diagnosis.md` (72).
+//! What comes anew with every set-up comes so at several joints, since axes are referenced together, and every joint gives way under
+//! weight: `docs/diagnosis.md` (72).
 
 use std::sync::Arc;
 
@@ -7,6 +8,7 @@ use serde::Serialize;
 use super::diagnosis::Named;
 use super::held_out::Model;
 use super::search::{Active, Rival, Search};
+use super::set_ups;
 use crate::effects::Library;
 use crate::machine::Machine;
 
@@ -17,22 +19,52 @@ pub struct Companion {
     pub effect: String,
     /// Name of the place.
     pub at: String,
+    /// Whether it comes anew with every set-up; else every joint has it more or less.
+    pub of_set_up: bool,
 }
 
-/// Effects that come anew with every set-up, at all other places where they are more likely than not, beside those that are kept.
+/// Effects that hardly ever come alone, at all other places where they are more likely than not, beside those that are kept; each time the
+/// one with the greatest evidence.
 pub(super) fn companions(search: &Search, library: &Library, kept: &[Active]) -> Vec<Active> {
+    let of = |candidate: usize| &search.candidates[candidate];
+    let comes_along = |candidate: usize| {
+        let (own, family) = (of(candidate), &library.families()[of(candidate).family]);
+        let is_alike = |effect: &Active| match family.each_setup {
+            true => of(effect.candidate).family == own.family,
+            false => {
+                family.at_every_joint && !search.in_motion && of(effect.candidate).told_as == own.told_as
+            }
+        };
+        own.parameters.is_empty() && kept.iter().any(is_alike)
+    };
+    let known = |all: &[Active], candidate: usize| all.iter().any(|effect| effect.candidate == candidate);
     let mut all = kept.to_vec();
-    for (i, candidate) in search.candidates.iter().enumerate() {
-        let comes_along = library.families()[candidate.family].each_setup
-            && candidate.parameters.is_empty()
-            && kept.iter().any(|effect| search.candidates[effect.candidate].family == candidate.family);
-        if !comes_along || kept.iter().any(|effect| effect.candidate == i) {
-            continue;
-        }
+    let mut left: Vec<usize> =
+        (0..search.candidates.len()).filter(|i| comes_along(*i) && !known(kept, *i)).collect();
+    while !left.is_empty() {
         let space = Arc::new(search.beside(&all, None));
-        let score = search.rows.score_at(candidate, &[], &search.rows.field(space.clone()), search.heat);
-        let Some(score) = score.filter(|score| score.evidence > 0.0) else { continue };
-        all.extend(search.enter(&Rival::new(i, score.evidence, score), &space));
+        let field = search.rows.field(space.clone());
+        let judged = left.iter().filter_map(|i| {
+            let score = search.rows.score_at(of(*i), &[], &field, search.heat)?;
+            Some(Rival::new(*i, score.evidence, score))
+        });
+        let Some(best) = judged.max_by(|a, b| a.weight.total_cmp(&b.weight)).filter(|r| r.weight > 0.0)
+        else {
+            break;
+        };
+        left.retain(|i| *i != best.candidate);
+        all.extend(search.enter(&best, &space));
+    }
+    // What every joint has may still be different from what it is taken for, where set-ups that are left out do not bear it out.
+    let of_set_up = |effect: &Active| library.families()[of(effect.candidate).family].each_setup;
+    let borne_out: Vec<Active> = all
+        .iter()
+        .enumerate()
+        .filter(|(i, e)| *i < kept.len() || of_set_up(e))
+        .map(|(_, e)| e.clone())
+        .collect();
+    if borne_out.len() < all.len() && set_ups::foretell(search, &all, &borne_out) == Some(false) {
+        all = borne_out;
     }
     all.split_off(kept.len())
 }

@@ -9,6 +9,7 @@ use super::not_tried::NotTried;
 use super::outliers::{Outliers, WithoutOutliers};
 use super::search::Search;
 use super::set_ups::SetUpLeftOut;
+use super::side_branches::UnseenSideBranch;
 use super::traces::Traces;
 use super::unexplained::Unexplained;
 use crate::effects::StoredEffect;
@@ -64,6 +65,9 @@ pub struct Diagnosis {
     /// Effects that could not be looked for in these recordings.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub not_tried: Vec<NotTried>,
+    /// What hangs on the machine beside its chain, and no recording says how it stood.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unseen_side_branches: Vec<UnseenSideBranch>,
     /// Rows left out because a number was missing.
     #[serde(skip_serializing_if = "is_zero")]
     pub dropped: u64,

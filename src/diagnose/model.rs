@@ -5,6 +5,7 @@ use super::diagnosis::{Named, RmsByModel};
 use crate::calibration::{CalibratedMachine, terms};
 use crate::effects::{RecordingFacts, StoredEffect};
 use crate::error::{Error, Result};
+use crate::feature::as_seen_in;
 use crate::identify::{Model, Options, calibrate_model};
 use crate::machine::Machine;
 use crate::recording::Recording;
@@ -24,6 +25,7 @@ impl Diagnosis {
         options: Options,
         progress: &dyn Fn(&str),
     ) -> Result<CalibratedMachine> {
+        let machine = &as_seen_in(machine, recordings);
         let facts = RecordingFacts::of(machine, recordings)?;
         let named: Vec<Named> = self.named.iter().map(|n| taking_part(n, recordings)).collect();
         let mut all: Vec<Term> = Vec::new();

@@ -104,7 +104,8 @@ pub(super) fn report(
     let kept: Vec<Active> = told.iter().map(|(i, ..)| active[*i].clone()).collect();
     let left_over = residual_of(search, &kept);
     let companions = companions::companions(search, library, &kept);
-    let set_ups_left_out = set_ups::left_out(search, &[kept.as_slice(), &companions].concat(), &placebos);
+    let in_model = [kept.as_slice(), &companions].concat();
+    let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
     let (findings, mut named): (Vec<Finding>, Vec<Named>) =
         told.into_iter().map(|(_, finding, named)| (finding, named)).unzip();
     named.extend(companions::named(search, (machine, library), &kept, &companions));
@@ -124,11 +125,16 @@ pub(super) fn report(
         unexplained,
         companions: (companions.iter())
             .map(|effect| &search.candidates[effect.candidate])
-            .map(|c| Companion { effect: c.effect.clone(), at: c.place.name(machine) })
+            .map(|c| Companion {
+                effect: c.effect.clone(),
+                at: c.place.name(machine),
+                of_set_up: library.families()[c.family].each_setup,
+            })
             .collect(),
         stand_still: approaches(search, &kept, machine),
         named,
         not_tried: Vec::new(),
+        unseen_side_branches: Vec::new(),
         dropped: linear.fit.dropped,
         outliers: Vec::new(),
         rms_without_outliers_m: None,
@@ -137,7 +143,7 @@ pub(super) fn report(
         location_errors: linear.fit.location_errors.clone(),
     };
     outliers::fill(search, &residual_of(search, &[]), &left_over, &mut diagnosis);
-    folds::fill(search, &kept, &mut diagnosis);
+    folds::fill(search, &in_model, &mut diagnosis);
     traces::fill(search, &kept, &left_over, machine, &mut diagnosis);
     diagnosis
 }

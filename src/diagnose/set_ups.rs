@@ -68,6 +68,25 @@ pub(super) fn left_out(search: &Search, told: &[Active], placebos: &[Option<Plac
     names.iter().map(one).collect()
 }
 
+/// Whether the first effects foretell set-ups that are left out no worse than the second, lengths and angles alike; `None` where there are
+/// not several.
+pub(super) fn foretell(search: &Search, first: &[Active], second: &[Active]) -> Option<bool> {
+    let names = names(search);
+    let squares = |told: &[Active]| -> Option<[f64; 2]> {
+        let effects: Option<Vec<DMatrix<f64>>> = told.iter().map(|effect| effect.raw(search)).collect();
+        let left = SetUps::new(search, &names, &effects?).left(search);
+        let mut sums = [0.0; 2];
+        let used = (0..left.len()).filter(|row| !search.rows.whitener.out[*row]);
+        used.for_each(|row| sums[usize::from(search.rows.linear.angle[row])] += left[row] * left[row]);
+        Some(sums)
+    };
+    if !says(search, &names) {
+        return None;
+    }
+    let (first, second) = (squares(first)?, squares(second)?);
+    Some((0..2).all(|kind| first[kind] <= second[kind]))
+}
+
 /// Whether there are several set-ups, and every one says where the machine stands.
 fn says(search: &Search, names: &[String]) -> bool {
     names.len() > 1 && names.iter().all(|name| samples_of(search, name) >= FEWEST)

@@ -56,6 +56,9 @@ pub struct Family {
     /// Has coefficients of its own in every set-up: it belongs to where the machine stands, not to the machine.
     #[serde(default)]
     pub each_setup: bool,
+    /// Every joint has it, more or less: where it is found at one, the model may have it at the others too.
+    #[serde(default)]
+    pub at_every_joint: bool,
     /// Which places of a branch come into question.
     #[serde(default)]
     pub which: Which,

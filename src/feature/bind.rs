@@ -24,6 +24,8 @@ pub(super) enum Node {
     Order(Vec<(String, f64)>, bool),
     /// Name and unit.
     Channel(String, String),
+    /// What needs further columns, by name and unit.
+    Needing(Vec<(String, String)>, Box<Node>),
     /// Names of recordings.
     Only(Vec<String>, Box<Node>),
     Sum(Vec<Node>),
@@ -268,10 +270,10 @@ impl Feature {
     /// The extra channels that it needs, by name and unit.
     pub fn channels(&self) -> Vec<(String, String)> {
         let mut names = Vec::new();
-        each(&self.node, &mut |n| {
-            if let Node::Channel(name, unit) = n {
-                names.push((name.clone(), unit.clone()));
-            }
+        each(&self.node, &mut |n| match n {
+            Node::Channel(name, unit) => names.push((name.clone(), unit.clone())),
+            Node::Needing(columns, _) => names.extend_from_slice(columns),
+            _ => {}
         });
         names.sort();
         names.dedup();
@@ -302,6 +304,13 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
     use Expression as E;
     let own = || b.own.ok_or(Unbound::NoJoint);
     let column = |column| own().map(|j| Node::Joint(j, column));
+    // Side branches weigh on it too, and stand where the recording says.
+    let weight = |column| {
+        own().map(|j| {
+            let (node, needs) = (Node::Joint(j, column), weights::columns(b.machine, j));
+            if needs.is_empty() { node } else { Node::Needing(needs, Box::new(node)) }
+        })
+    };
     let mut next = || {
         *memories += 1;
         *memories - 1
@@ -326,13 +335,13 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
         E::Acceleration => column(Column::Acceleration)?,
         E::SinceReversal => column(Column::SinceReversal)?,
         E::Travelled => column(Column::Travelled)?,
-        E::Gravity => column(Column::Gravity)?,
+        E::Gravity => weight(Column::Gravity)?,
         E::Load => column(Column::Load)?,
-        E::Moment(n) => column(Column::Weight(weights::moment(*n)))?,
-        E::Shear(n) => column(Column::Weight(weights::shear(*n)))?,
+        E::Moment(n) => weight(Column::Weight(weights::moment(*n)))?,
+        E::Shear(n) => weight(Column::Weight(weights::shear(*n)))?,
         E::Lever(k, n) => {
             let index = weights::lever(b.machine, own()?, *k, *n).ok_or(Unbound::NoLever)?;
-            column(Column::Weight(index))?
+            weight(Column::Weight(index))?
         }
         E::Stroke => {
             let j = own()?;
@@ -421,6 +430,7 @@ fn parts(node: &Node) -> Vec<&Node> {
         | Node::Function(_, e)
         | Node::Chebyshev(_, e)
         | Node::Between(e, ..)
+        | Node::Needing(_, e)
         | Node::Only(_, e) => {
             vec![e]
         }
@@ -443,6 +453,7 @@ fn parts_mut(node: &mut Node) -> Vec<&mut Node> {
         | Node::Function(_, e)
         | Node::Chebyshev(_, e)
         | Node::Between(e, ..)
+        | Node::Needing(_, e)
         | Node::Only(_, e) => {
             vec![e]
         }

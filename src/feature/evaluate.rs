@@ -199,6 +199,7 @@ impl<S: Scalar> Pass<'_, S> {
             Node::Channel(name, _) => {
                 self.lifted(self.samples.channels.get(name).map_or(&[][..], Vec::as_slice))
             }
+            Node::Needing(_, e) => self.evaluate(e),
             Node::Only(recordings, e) => {
                 let value = self.evaluate(e);
                 match recordings.contains(&self.samples.recording) {

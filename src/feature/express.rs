@@ -34,6 +34,7 @@ pub(super) fn express(node: &Node, machine: &Machine, parameters: &[String]) -> 
         Node::Order(begins, false) => E::OrderIn(begins.clone()),
         Node::Order(begins, true) => E::BeginningIn(begins.clone()),
         Node::Channel(name, unit) => E::Channel(name.clone(), unit.clone()),
+        Node::Needing(_, e) => express(e, machine, parameters),
         Node::Only(recordings, e) => E::Only(recordings.clone(), inner(e)),
         Node::Sum(nodes) => E::Sum(list(nodes)),
         Node::Product(nodes) => E::Product(list(nodes)),

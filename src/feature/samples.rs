@@ -326,9 +326,14 @@ impl<'a, I: Iterator<Item = Result<Chunk>>> Follow<'a, I> {
             if let Some(weights) = &self.weights {
                 let sweep = sweep.get_or_insert_with(|| weights.sweep(q));
                 weights.sweep_into(q, sweep);
+                let of = |column: &str| {
+                    let channel = self.channels.iter().position(|name| name == column);
+                    channel.map_or(f64::NAN, |i| chunk.channels[i][k])
+                };
+                let sides = weights.sides(machine, sweep, &displacements, of);
                 for (j, columns) in joints.iter_mut().enumerate() {
                     let Some(columns) = columns else { continue };
-                    weights.put(machine, sweep, &displacements, j, columns);
+                    weights.put(machine, (sweep, &sides), &displacements, j, columns);
                 }
             }
             moved.push(displacements);

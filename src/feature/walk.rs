@@ -123,7 +123,9 @@ impl Walk {
         let loads = self.weights.as_ref().map(|(weights, sweep)| {
             let mut sweep = sweep.clone();
             weights.sweep_into(q, &mut sweep);
-            (weights, sweep)
+            // Nobody says where a side branch stands: what depends on it was left out.
+            let sides = weights.sides(machine, &sweep, &displacements, |_| f64::NAN);
+            (weights, sweep, sides)
         });
         for (i, (j, ..)) in self.history.joints.iter().enumerate() {
             let (position, travelled, speeds) = look(i, *j);
@@ -136,8 +138,8 @@ impl Walk {
                 acceleration: speeds.iter().map(|s| s.1).collect(),
                 ..JointSamples::default()
             };
-            if let Some((weights, sweep)) = &loads {
-                weights.put(machine, sweep, &displacements, *j, &mut columns);
+            if let Some((weights, sweep, sides)) = &loads {
+                weights.put(machine, (sweep, sides), &displacements, *j, &mut columns);
             }
             joints[*j] = Some(columns);
         }

@@ -2,8 +2,8 @@
 
 use super::{Expression, JointSamples};
 use crate::chain::{Chain, Sweep};
-use crate::lie::{Pose, Vec3};
-use crate::machine::{Branch, JointKind, Machine};
+use crate::lie::{Pose, Twist, Vec3};
+use crate::machine::{Branch, Dyad, JointKind, Machine, SideBranch};
 use crate::recording::Recording;
 
 /// Standard acceleration of gravity, m/s².
@@ -41,20 +41,74 @@ pub(super) fn expression(machine: &Machine, own: usize, column: usize) -> Expres
     }
 }
 
-/// Joints from the own one on: how far beyond, dyad, direction. First moments along the axis of a joint belong to what carries it, and
-/// say nothing about a joint that slides.
-fn levers(machine: &Machine, own: usize) -> impl Iterator<Item = (usize, usize, usize)> {
-    let kind = move |j: usize| machine.dyads()[j].joint.as_ref().map(|joint| joint.kind);
+/// A body that weighs on a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Body {
+    /// What a dyad of the chain moves, by index.
+    Chain(usize),
+    /// What a dyad of a side branch moves, by index among those of all side branches.
+    Side(usize),
+}
+
+/// Joints from the own one on, then those of the side branches that it carries: how far beyond, body, direction. First moments along
+/// the axis of a joint belong to what carries it, and say nothing about a joint that slides.
+fn levers(machine: &Machine, own: usize) -> impl Iterator<Item = (usize, Body, usize)> {
+    let kind = move |body: Body| dyad_of(machine, body).joint.as_ref().map(|joint| joint.kind);
+    let bodies =
+        if kind(Body::Chain(own)) == Some(JointKind::Revolute) { carried(machine, own) } else { Vec::new() };
+    let joints = bodies.into_iter().filter(move |body| kind(*body).is_some()).enumerate();
+    joints.flat_map(move |(k, body)| {
+        let directions = if kind(body) == Some(JointKind::Revolute) { 2 } else { 1 };
+        (0..directions).map(move |n| (k, body, n))
+    })
+}
+
+/// What a joint carries: dyads from its own on, then those of side branches.
+fn carried(machine: &Machine, own: usize) -> Vec<Body> {
     let end = match machine.branch(own) {
         Branch::Workpiece => machine.workpiece_count(),
         Branch::Tool => machine.dyads().len(),
     };
-    let end = if kind(own) == Some(JointKind::Revolute) { end } else { own };
-    let joints = (own..end).filter(move |j| kind(*j).is_some()).enumerate();
-    joints.flat_map(move |(k, j)| {
-        let directions = if kind(j) == Some(JointKind::Revolute) { 2 } else { 1 };
-        (0..directions).map(move |n| (k, j, n))
-    })
+    let mut bodies: Vec<Body> = (own..end).map(Body::Chain).collect();
+    let mut first = 0;
+    for side in machine.side_branches() {
+        if machine.frame_index(&side.on).is_some_and(|on| (own..end).contains(&on)) {
+            bodies.extend((first..first + side.dyads.len()).map(Body::Side));
+        }
+        first += side.dyads.len();
+    }
+    bodies
+}
+
+fn dyad_of(machine: &Machine, body: Body) -> &Dyad {
+    match body {
+        Body::Chain(j) => &machine.dyads()[j],
+        Body::Side(i) => machine
+            .side_branches()
+            .iter()
+            .flat_map(|side| &side.dyads)
+            .nth(i)
+            .expect("a dyad of a side branch"),
+    }
+}
+
+/// Columns that a recording needs to say how the side branches stand that a joint carries: name and unit.
+pub(super) fn columns(machine: &Machine, own: usize) -> Vec<(String, String)> {
+    let is_carried = |side: &&SideBranch| {
+        let on = machine.frame_index(&side.on);
+        on.is_some_and(|on| on >= own && machine.branch(on) == machine.branch(own))
+    };
+    let sides = machine.side_branches().iter().filter(is_carried);
+    sides.flat_map(SideBranch::columns).map(|(name, unit)| (name.into(), unit.into())).collect()
+}
+
+/// The machine as far as these recordings show it: without the side branches whose joints one of them has no column for. How those stood
+/// is not known then, and their weight is not told from that of what carries them.
+pub fn as_seen_in(machine: &Machine, recordings: &[Recording]) -> Machine {
+    let has = |name: &str| recordings.iter().all(|r| r.extra_channels().iter().any(|c| c.name == name));
+    let is_seen = |side: &&SideBranch| side.columns().all(|(name, _)| has(name));
+    let sides = machine.side_branches().iter().filter(is_seen).cloned().collect();
+    machine.clone().with_side_branches(sides).expect("side branches that the machine had")
 }
 
 /// Direction of gravity in the base frame, where the recording states it in frame `w`: that frame, all joints at zero, stands where
@@ -78,10 +132,21 @@ pub fn gravity_of(
 pub(super) struct Weights {
     chain: Chain<f64>,
     g_b: Vec3<f64>,
+    /// Dyads of the side branches.
+    sides: Vec<SideDyad>,
     /// Mass and its place behind the joint, by dyad; stated and substitute.
-    masses: Vec<Vec<(usize, f64, Vec3<f64>)>>,
-    /// Levers of every joint: dyad and direction in its frame.
-    levers: Vec<Vec<(usize, Vec3<f64>)>>,
+    masses: Vec<Vec<(Body, f64, Vec3<f64>)>>,
+    /// Levers of every joint: body and direction in its frame, and whether it slides that way.
+    levers: Vec<Vec<(Body, Vec3<f64>, bool)>>,
+}
+
+#[derive(Clone)]
+struct SideDyad {
+    /// Dyad of the chain that carries it, where it is the first of its branch.
+    on: Option<usize>,
+    previous_from_frame: Pose<f64>,
+    /// Twist of its joint, and the column that says where that stands.
+    joint: Option<(Twist<f64>, String)>,
 }
 
 impl Weights {
@@ -90,29 +155,38 @@ impl Weights {
         let g_b = gravity_b.unwrap_or(machine.gravity_b());
         let dyads = machine.dyads();
         let beyond = |j: usize| {
-            let end =
-                if machine.branch(j) == Branch::Workpiece { machine.workpiece_count() } else { dyads.len() };
-            let stated: Vec<_> = (j..end)
-                .filter_map(|k| dyads[k].mass.map(|m| (k, m.mass, m.centre)))
+            let bodies = carried(machine, j);
+            let stated: Vec<_> = (bodies.iter())
+                .filter_map(|body| dyad_of(machine, *body).mass.map(|m| (*body, m.mass, m.centre)))
                 .filter(|m| m.1 > 0.0)
                 .collect();
             match stated.is_empty() {
-                true => (j + 1..end).map(|k| (k, 1.0, Vec3([0.0; 3]))).collect(),
+                true => bodies[1..].iter().map(|body| (*body, 1.0, Vec3([0.0; 3]))).collect(),
                 false => stated,
             }
         };
-        let direction = |j: usize, n: usize| match &dyads[j].joint {
-            Some(joint) if joint.kind == JointKind::Prismatic => (j, joint.axis),
-            Some(joint) => (j, joint.axis.across()[n]),
-            None => (j, Vec3([0.0; 3])),
+        let direction = |body: Body, n: usize| match &dyad_of(machine, body).joint {
+            Some(joint) if joint.kind == JointKind::Prismatic => (body, joint.axis, true),
+            Some(joint) => (body, joint.axis.across()[n], false),
+            None => (body, Vec3([0.0; 3]), false),
         };
         let of = |own: usize| match dyads[own].joint {
-            Some(_) => levers(machine, own).map(|(_, j, n)| direction(j, n)).collect(),
+            Some(_) => levers(machine, own).map(|(_, body, n)| direction(body, n)).collect(),
             None => Vec::new(),
         };
+        let side = |(i, on, dyad): (usize, Option<usize>, &Dyad)| SideDyad {
+            on: on.filter(|_| i == 0),
+            previous_from_frame: dyad.placement.pose(),
+            joint: dyad.joint.as_ref().map(|joint| (joint.twist(), joint.name.clone())),
+        };
+        let sides = machine.side_branches().iter().flat_map(|branch| {
+            let on = machine.frame_index(&branch.on);
+            branch.dyads.iter().enumerate().map(move |(i, dyad)| side((i, on, dyad)))
+        });
         Weights {
             chain,
             g_b: g_b.times(GRAVITY),
+            sides: sides.collect(),
             masses: (0..dyads.len()).map(beyond).collect(),
             levers: (0..dyads.len()).map(of).collect(),
         }
@@ -128,11 +202,34 @@ impl Weights {
         self.chain.sweep_into(q, sweep);
     }
 
-    /// Puts what weighs on the joint of dyad `j` behind its columns.
-    pub fn put(
+    /// Poses of what the dyads of side branches move, and how far their joints have; `of`: displacement by the name of its column, m or rad.
+    pub fn sides(
         &self,
         machine: &Machine,
         sweep: &Sweep<f64>,
+        displacements: &[f64],
+        of: impl Fn(&str) -> f64,
+    ) -> Vec<(Pose<f64>, f64)> {
+        let mut b_from_previous = Pose::identity(0.0);
+        let next = |side: &SideDyad| {
+            if let Some(on) = side.on {
+                b_from_previous = behind(machine, sweep, displacements, on);
+            }
+            b_from_previous = b_from_previous * side.previous_from_frame;
+            let displacement = side.joint.as_ref().map_or(0.0, |(_, column)| of(column));
+            if let Some((twist, _)) = &side.joint {
+                b_from_previous = b_from_previous * Pose::exp(twist.times(displacement));
+            }
+            (b_from_previous, displacement)
+        };
+        self.sides.iter().map(next).collect()
+    }
+
+    /// Puts what weighs on the joint of dyad `j` behind its columns; `sides` from [`Weights::sides`].
+    pub fn put(
+        &self,
+        machine: &Machine,
+        (sweep, sides): (&Sweep<f64>, &[(Pose<f64>, f64)]),
         displacements: &[f64],
         j: usize,
         columns: &mut JointSamples,
@@ -140,13 +237,13 @@ impl Weights {
         let Some(joint) = &machine.dyads()[j].joint else { return };
         let b_from_j = sweep.b_from_frame(j);
         let n_b = b_from_j.rotation * joint.axis;
-        let behind = |k: usize| match &machine.dyads()[k].joint {
-            Some(joint) => sweep.b_from_frame(k) * Pose::exp(joint.twist().times(displacements[k])),
-            None => sweep.b_from_frame(k),
+        let behind = |body: Body| match body {
+            Body::Chain(k) => behind(machine, sweep, displacements, k),
+            Body::Side(i) => sides[i].0,
         };
         let (mut mass, mut moment_b) = (0.0, Vec3([0.0; 3]));
-        for (k, m, centre) in &self.masses[j] {
-            let arm_b = behind(*k).transform(*centre) - b_from_j.translation;
+        for (body, m, centre) in &self.masses[j] {
+            let arm_b = behind(*body).transform(*centre) - b_from_j.translation;
             mass += m;
             moment_b = moment_b + arm_b.cross(self.g_b).times(*m);
         }
@@ -169,11 +266,13 @@ impl Weights {
         let shear_b = n_b.cross(self.g_b).times(-mass);
         let moments = directions.iter().map(|d| d.dot(moment_b));
         let shears = directions.iter().map(|d| d.dot(shear_b));
-        let levers = self.levers[j].iter().map(|(k, direction)| {
-            let slides =
-                matches!(&machine.dyads()[*k].joint, Some(joint) if joint.kind == JointKind::Prismatic);
-            let arm = if slides { direction.times(displacements[*k]) } else { *direction };
-            n_b.dot((behind(*k).rotation * arm).cross(self.g_b))
+        let levers = self.levers[j].iter().map(|(body, direction, slides)| {
+            let by = match body {
+                _ if !slides => 1.0,
+                Body::Chain(k) => displacements[*k],
+                Body::Side(i) => sides[*i].1,
+            };
+            n_b.dot((behind(*body).rotation * direction.times(by)).cross(self.g_b))
         });
         columns.weights.resize(MOMENTS + self.levers[j].len(), Vec::new());
         let all = moments.chain(shears).chain(levers);
@@ -182,5 +281,13 @@ impl Weights {
             .iter_mut()
             .zip(all)
             .for_each(|(c, x)| c.push(if x.abs() < ROUNDING { 0.0 } else { x }));
+    }
+}
+
+/// Pose of what the joint of dyad `k` moves.
+fn behind(machine: &Machine, sweep: &Sweep<f64>, displacements: &[f64], k: usize) -> Pose<f64> {
+    match &machine.dyads()[k].joint {
+        Some(joint) => sweep.b_from_frame(k) * Pose::exp(joint.twist().times(displacements[k])),
+        None => sweep.b_from_frame(k),
     }
 }

@@ -136,6 +136,12 @@ pub enum MachineFault {
         /// As written.
         sign: i8,
     },
+    /// A side branch with what only a chain that is measured can have.
+    #[error("{what}")]
+    BadSideBranch {
+        /// What is wrong.
+        what: String,
+    },
     /// A machine without any joint.
     #[error("no dyad has a joint")]
     NoJoint,
@@ -208,6 +214,7 @@ impl MachineFault {
             TwoPlacements { .. } => "keep one of the two ways of saying where the frame is".into(),
             NcWord { .. } => "write address: letters and digits such as \"B\" or \"C1\", sign: 1 or -1".into(),
             NoJoint => "a machine needs a joint: (frame: \"x\", joint: Prismatic(axis: \"x\"))".into(),
+            BadSideBranch { .. } => "leave it out: a side branch weighs, its joints are columns of recordings, and nothing of it is identified".into(),
             UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
             BadPieces { .. } => "write the pieces as `calibrate --directions` does".into(),
             BadEffect { .. } => "write the effects as `diagnose -o` does, or take this one out".into(),

@@ -23,6 +23,8 @@ pub(crate) struct MachineForm {
     pub tolerance: Option<ToleranceForm>,
     pub workpiece: Vec<DyadForm>,
     pub tool: Vec<DyadForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub side_branches: Vec<SideBranchForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationForm>,
 }
@@ -59,6 +61,13 @@ pub(crate) enum AngleUnit {
 pub(crate) struct ToleranceForm {
     pub translation: f64,
     pub rotation: f64,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "side_branch", deny_unknown_fields)]
+pub(crate) struct SideBranchForm {
+    pub on: String,
+    pub dyads: Vec<DyadForm>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]

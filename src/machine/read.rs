@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::form::{
-    AxisForm, DyadForm, JointBody, JointForm, MachineForm, MoveForm, ToleranceForm, Triple, UnitsForm,
+    AxisForm, DyadForm, JointBody, JointForm, MachineForm, MoveForm, SideBranchForm, ToleranceForm, Triple,
+    UnitsForm,
 };
 use super::{
     Branch, Drive, Dyad, FileUnits, Joint, JointKind, Machine, MachineFault, MassPoint, NcWord, Placement,
-    Tolerance,
+    SideBranch, Tolerance,
 };
 use crate::document::Document;
 use crate::error::{Error, Result};
@@ -16,7 +17,7 @@ use crate::lie::{Pose, Vec3};
 use crate::units::Unit;
 
 /// A value and the path at which it was found wrong.
-type Checked<T> = std::result::Result<T, (String, MachineFault)>;
+pub(super) type Checked<T> = std::result::Result<T, (String, MachineFault)>;
 
 /// Nothing on a machine is larger than this, in m or rad.
 const LARGEST: f64 = 1e9;
@@ -62,7 +63,12 @@ impl Machine {
         if let Some(form) = form.tolerance {
             machine = machine.with_tolerance(tolerance(form, units, "tolerance")?)?;
         }
-        Ok(machine)
+        let side = |(b, form): (usize, &SideBranchForm)| -> Checked<SideBranch> {
+            let path = |i| format!("side_branches[{b}].dyads[{i}]");
+            let dyads = form.dyads.iter().enumerate().map(|(i, f)| dyad(f, units, &path(i)));
+            Ok(SideBranch { on: form.on.clone(), dyads: dyads.collect::<Checked<_>>()? })
+        };
+        machine.with_side_branches(form.side_branches.iter().enumerate().map(side).collect::<Checked<_>>()?)
     }
 
     /// Checks everything that concerns more than one value, and works out commands and drives.
@@ -240,7 +246,7 @@ fn sayable(si: f64, unit: Unit) -> f64 {
     unit.to_si(written) + 0.0
 }
 
-fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
+pub(super) fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
     let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
     if name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.len() <= 64 && name.chars().all(fits) {
         return Ok(());
@@ -388,7 +394,7 @@ fn unit_axis(axis: Vec3<f64>, name: &str, path: &str) -> Checked<Vec3<f64>> {
     Ok(if (length - 1.0).abs() < 1e-15 { axis } else { unit })
 }
 
-fn check_dyad(dyad: &Dyad, path: &str, units: FileUnits) -> Checked<()> {
+pub(super) fn check_dyad(dyad: &Dyad, path: &str, units: FileUnits) -> Checked<()> {
     for (field, vector) in [("at", dyad.placement.at), ("rotation", dyad.placement.rotation)] {
         let [x, y, z] = vector.0;
         finite(&format!("{path}.{field}"), (x, y, z), &format!("a number of `{field}`"))?;

@@ -3,8 +3,8 @@
 use ron::ser::PrettyConfig;
 
 use super::form::{
-    AngleUnit, AxisForm, DyadForm, JointBody, JointForm, LengthUnit, MachineForm, NcForm, ToleranceForm,
-    Triple, UnitsForm,
+    AngleUnit, AxisForm, DyadForm, JointBody, JointForm, LengthUnit, MachineForm, NcForm, SideBranchForm,
+    ToleranceForm, Triple, UnitsForm,
 };
 use super::{Dyad, FileUnits, Joint, JointKind, Machine, Tolerance};
 use crate::document::EXTENSIONS;
@@ -30,6 +30,9 @@ impl Machine {
             tolerance: (self.tolerance != Tolerance::DEFAULT).then(|| tolerance(self.tolerance, units)),
             workpiece: forms(workpiece),
             tool: forms(tool),
+            side_branches: (self.side_branches.iter())
+                .map(|side| SideBranchForm { on: side.on.clone(), dyads: forms(&side.dyads) })
+                .collect(),
             calibration: None,
         }
     }

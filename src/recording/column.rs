@@ -67,8 +67,8 @@ const ROTATION: [&str; 3] = ["rx", "ry", "rz"];
 const QUATERNION: [&str; 4] = ["qw", "qx", "qy", "qz"];
 
 /// A name of the header row before its unit is known to be right.
-struct Cell {
-    name: String,
+pub(super) struct Cell {
+    pub name: String,
     unit: Option<String>,
 }
 
@@ -89,13 +89,17 @@ impl Cell {
 }
 
 /// What a name means, before channels are numbered: its role, and what it must measure.
-type Meaning = Option<(Role, Quantity)>;
+pub(super) type Meaning = Option<(Role, Quantity)>;
 
 fn meaning(machine: &Machine, measured: Measurement, name: &str) -> Meaning {
     // A joint's name comes first: a machine may call its joints `r` and `d`.
     if let Some((dyad, joint)) = machine.joints().find(|(_, joint)| joint.name == name) {
         let command = machine.commands().iter().position(|c| c == name);
         return Some((command.map_or(Role::Follower(dyad), Role::Command), quantity_of(joint.kind)));
+    }
+    // Of the joints of a side branch the number follows.
+    if let Some(joint) = machine.side_joint(name) {
+        return Some((Role::Channel(0), quantity_of(joint.kind)));
     }
     if name == "t" {
         return Some((Role::Time, Quantity::Time));
@@ -145,8 +149,9 @@ impl Layout {
                 let known = machine.commands().to_vec();
                 return Err(fail(Fault::DirectionOfNothing { name: cell.name, known }.into()));
             }
-            let role = meaning.map_or(Role::Channel(channels.len()), |(role, _)| role);
-            if let Role::Channel(_) = role {
+            let mut role = meaning.map_or(Role::Channel(0), |(role, _)| role);
+            if let Role::Channel(number) = &mut role {
+                *number = channels.len();
                 channels.push(Channel { name: cell.name.clone(), unit });
             }
             columns.push(Column { name: cell.name, unit, role });
@@ -253,7 +258,7 @@ impl Layout {
     }
 }
 
-fn cells(line: u64, row: &[u8]) -> Result<Vec<Cell>, Fail> {
+pub(super) fn cells(line: u64, row: &[u8]) -> Result<Vec<Cell>, Fail> {
     let mut fields = Vec::new();
     text::split(row, |field| fields.push(field));
     if fields.len() == 1 {
@@ -270,7 +275,7 @@ fn cells(line: u64, row: &[u8]) -> Result<Vec<Cell>, Fail> {
     fields.into_iter().enumerate().map(cut).collect()
 }
 
-fn unit(cell: &Cell, meaning: Meaning) -> Result<Unit, Box<Fault>> {
+pub(super) fn unit(cell: &Cell, meaning: Meaning) -> Result<Unit, Box<Fault>> {
     let what = format!("column `{}`", text::shown(cell.name.as_bytes()));
     let expected = meaning.map(|(_, quantity)| quantity);
     let Some(symbol) = &cell.unit else {

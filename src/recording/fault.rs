@@ -299,6 +299,28 @@ pub enum RecordingFault {
         /// How often.
         count: u64,
     },
+    /// Two recordings to be joined that have not as many rows.
+    #[error("there are {rows} rows, and {other} has {other_rows}")]
+    JoinRows {
+        /// Of this recording.
+        rows: u64,
+        /// The other recording.
+        other: String,
+        /// Its rows.
+        other_rows: u64,
+    },
+    /// Two recordings to be joined of which nothing shows that they belong together.
+    #[error("no column that changes has the same numbers here and in {other}")]
+    NothingShared {
+        /// The other recording.
+        other: String,
+    },
+    /// A name for joined columns that cannot be used.
+    #[error("columns cannot be named `{name}.`")]
+    JoinName {
+        /// As written.
+        name: String,
+    },
 }
 
 impl RecordingFault {
@@ -328,7 +350,7 @@ impl RecordingFault {
             NotPositive { .. } => "write a number above zero".into(),
             ZeroVector { .. } => "write a vector with a length, such as `0,0,1`".into(),
             WrongMachine { found, expected } => {
-                format!("use the machine file of \"{found}\", or write `# machine: {expected}`")
+                format!("use the machine file of \"{found}\", or write `# machine: {expected}`; `kincal join` lays a recording of the same moments beside another one")
             }
             NoMeasurement => {
                 "add `# measurement: ` with one of: distance, position, pose, displacement, joint".into()
@@ -398,6 +420,9 @@ impl RecordingFault {
             }
             TimeBackwards { .. } => "sort the rows by `t`, or drop the column `t` if it is no clock".into(),
             NoRows => "add rows of numbers below the header row".into(),
+            JoinRows { .. } => "join recordings of the same moments, row by row; an empty cell keeps the place of what is missing".into(),
+            NothingShared { .. } => "both need a column that shows which rows belong together: `t`, or the commands of an axis that both have".into(),
+            JoinName { .. } => "use letters, digits, `_`, `-` and `.`, starting with a letter, such as `left`".into(),
             AllDropped { column, .. } => format!("write the numbers of column `{column}`"),
         }
     }

@@ -2,7 +2,7 @@
 
 use super::Recording;
 use super::RecordingFault as Fault;
-use super::column::{Layout, Role};
+use super::column::{Column, Layout, Role};
 use super::header::{Measurement, known_key};
 use super::lines::{Line, Lines};
 use super::text::{self, Fail, LARGEST, LARGEST_OTHER};
@@ -177,14 +177,17 @@ impl<'a> Pass<'a> {
         let layout = &recording.layout;
         let other = |role| matches!(role, Role::Time | Role::Channel(_));
         let limits = layout.columns.iter().map(|c| if other(c.role) { LARGEST_OTHER } else { LARGEST });
-        let idle = |role| matches!(role, Role::Channel(_) | Role::Follower(_));
+        let idle = |c: &Column| match c.role {
+            Role::Channel(_) => recording.machine.side_joint(&c.name).is_none(),
+            role => matches!(role, Role::Follower(_)),
+        };
         let width = layout.columns.len();
         Ok(Pass {
             recording,
             lines: recording.data_lines()?,
             cells: vec![0.0; width],
             limits: limits.collect(),
-            needed: (0..width).filter(|i| !idle(layout.columns[*i].role)).collect(),
+            needed: (0..width).filter(|i| !idle(&layout.columns[*i])).collect(),
             previous_time: None,
             rows: 0,
             drops: vec![0; width],

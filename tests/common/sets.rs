@@ -1,7 +1,8 @@
 //! Recordings of real machines by set, and how a set is split into what is learnt from and what is judged.
 
 use kincal::Machine;
-use kincal::recording::Recording;
+use kincal::feature::as_seen_in;
+use kincal::recording::{Recording, join};
 
 use super::{machine, shared};
 
@@ -16,13 +17,16 @@ pub struct Text {
 impl Text {
     pub fn read(folder: &str, file: &str) -> Option<Text> {
         let path = shared(&format!("recordings/{folder}/{file}.csv"))?;
-        let text = std::fs::read_to_string(path).expect("readable");
+        Some(Text::of(file, &std::fs::read_to_string(path).expect("readable")))
+    }
+
+    fn of(file: &str, text: &str) -> Text {
         let (mut head, mut rows) = (Vec::new(), Vec::new());
         for line in text.lines() {
             let of_head = line.starts_with('#') || head.last().is_none_or(|l: &String| l.starts_with('#'));
             if of_head { &mut head } else { &mut rows }.push(line.to_string());
         }
-        Some(Text { name: format!("{file}.csv"), head, rows })
+        Text { name: format!("{file}.csv"), head, rows }
     }
 
     /// The rows for which `keep` holds, as a recording.
@@ -80,7 +84,14 @@ impl Set {
         let texts: Option<Vec<Text>> = files.iter().map(|file| Text::read(folder, file)).collect();
         let last = folder.rsplit('/').next().expect("a name").to_string();
         let name = if files.len() == 1 { format!("{last} {}", files[0]) } else { last };
-        Some(Set { name, machine: machine(stem), texts: texts?, split })
+        Some(Set::of(name, stem, texts?, split))
+    }
+
+    /// The machine as far as the recordings show it.
+    fn of(name: String, stem: &str, texts: Vec<Text>, split: Split) -> Set {
+        let whole = machine(stem);
+        let recordings: Vec<Recording> = texts.iter().map(|text| text.whole(&whole)).collect();
+        Set { name, machine: as_seen_in(&whole, &recordings), texts, split }
     }
 
     pub fn whole(&self) -> Vec<Recording> {
@@ -176,6 +187,22 @@ pub fn hilti() -> Option<Set> {
 pub fn justin() -> Vec<Set> {
     let read = |arm: &str| Set::read(&format!("dlr_justin_{arm}"), "dlr_justin", &[arm], Split::Rows(5));
     ["right", "left"].into_iter().filter_map(read).collect()
+}
+
+/// Each arm with the joints of the other one beside its own.
+pub fn justin_with_both_arms() -> Vec<Set> {
+    let both = |own: &str, other: &str| {
+        let path = |arm: &str| shared(&format!("recordings/dlr_justin/{arm}.csv"));
+        let joined = join(&path(own)?, &path(other)?, other).unwrap_or_else(|e| panic!("{e}"));
+        let texts = vec![Text::of(own, &joined.text)];
+        Some(Set::of(
+            format!("dlr_justin {own} with {other}"),
+            &format!("dlr_justin_{own}"),
+            texts,
+            Split::Rows(5),
+        ))
+    };
+    [("right", "left"), ("left", "right")].into_iter().filter_map(|(own, other)| both(own, other)).collect()
 }
 
 pub fn fanuc() -> Option<Set> {

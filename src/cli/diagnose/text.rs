@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use kincal::diagnose::{
     Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, SaidBy,
-    StandsStill, Unexplained, Where,
+    StandsStill, Unexplained, UnseenSideBranch, Where,
 };
 use kincal::effects::in_words;
 use kincal::feature::Dimension;
@@ -55,18 +55,19 @@ pub(crate) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
 
 /// What the model has beside the findings, a line each: joints that have an effect of theirs too, and sides of approach.
 pub(crate) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
-    let mut by_effect: Vec<(&str, Vec<&str>)> = Vec::new();
-    for Companion { effect, at } in &diagnosis.companions {
-        match by_effect.iter_mut().find(|(known, _)| known == effect) {
-            Some((_, places)) => places.push(at),
-            None => by_effect.push((effect, vec![at])),
+    let mut by_effect: Vec<(&str, bool, Vec<&str>)> = Vec::new();
+    for Companion { effect, at, of_set_up } in &diagnosis.companions {
+        match by_effect.iter_mut().find(|(known, ..)| known == effect) {
+            Some((.., places)) => places.push(at),
+            None => by_effect.push((effect, *of_set_up, vec![at])),
         }
     }
-    let one = |(effect, places): (&str, Vec<&str>)| {
-        let places = places.join(", ");
-        format!(
-            "the model has a small {effect} of {places} too: what comes anew with every set-up hardly does so at one place alone"
-        )
+    let one = |(effect, of_set_up, places): (&str, bool, Vec<&str>)| {
+        let because = match of_set_up {
+            true => "what comes anew with every set-up hardly does so at one place alone",
+            false => "every joint has it more or less",
+        };
+        format!("the model has a small {effect} of {} too: {because}", places.join(", "))
     };
     let still = |StandsStill { recording, at, direction, said_by, .. }: &StandsStill| {
         let side = if *direction > 0 { "rising" } else { "falling" };
@@ -77,7 +78,15 @@ pub(crate) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
             "{at} stands still all through {recording}, where the readings say that it came there {side}{hint}"
         )
     };
-    by_effect.into_iter().map(one).chain(diagnosis.stand_still.iter().map(still)).collect()
+    let unseen = |UnseenSideBranch { on, columns }: &UnseenSideBranch| {
+        format!(
+            "what hangs on {on} beside the chain is left out, since a recording has no column for each of its joints: {}; `kincal join` puts recordings of the same moments beside each other",
+            columns.join(", ")
+        )
+    };
+    let stand_still = diagnosis.stand_still.iter().map(still);
+    let unseen = diagnosis.unseen_side_branches.iter().map(unseen);
+    by_effect.into_iter().map(one).chain(stand_still).chain(unseen).collect()
 }
 
 /// Where there is nothing to be found.

@@ -1,0 +1,24 @@
+//! What hangs on the machine beside the chain that was measured, where nothing says how it stood.
+
+use serde::Serialize;
+
+use crate::machine::{Machine, SideBranch};
+
+/// A side branch whose joints have no column in some recording: its weight is not told from that of what carries it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct UnseenSideBranch {
+    /// Frame that carries it.
+    pub on: String,
+    /// Columns that would say how it stands.
+    pub columns: Vec<String>,
+}
+
+/// Side branches that the machine has and that the machine as it was seen has not.
+pub(super) fn unseen(machine: &Machine, seen: &Machine) -> Vec<UnseenSideBranch> {
+    let hidden = machine.side_branches().iter().filter(|side| !seen.side_branches().contains(side));
+    let one = |side: &SideBranch| UnseenSideBranch {
+        on: side.on.clone(),
+        columns: side.columns().map(|(name, unit)| format!("{name}[{unit}]")).collect(),
+    };
+    hidden.map(one).collect()
+}

@@ -1,0 +1,95 @@
+//! What hangs on a machine beside the chain that is measured: another arm, a counterweight, a cable carrier.
+
+use std::collections::BTreeSet;
+
+use super::read::{Checked, check_dyad, usable_name};
+use super::{Dyad, Joint, JointKind, Machine, MachineFault};
+
+/// Frames and joints that stand on a frame of the machine and weigh on it; nothing of them is measured or identified. Their joints are
+/// extra columns of recordings, by name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SideBranch {
+    /// Frame of the machine that carries it, behind that frame's joint.
+    pub on: String,
+    /// From there outwards.
+    pub dyads: Vec<Dyad>,
+}
+
+impl SideBranch {
+    /// Names and units (`m`, `rad`) of the columns that say how it stands.
+    pub fn columns(&self) -> impl Iterator<Item = (&str, &'static str)> {
+        self.dyads.iter().filter_map(|dyad| dyad.joint.as_ref()).map(|joint| {
+            let unit = match joint.kind {
+                JointKind::Prismatic => "m",
+                JointKind::Revolute => "rad",
+            };
+            (joint.name.as_str(), unit)
+        })
+    }
+}
+
+impl Machine {
+    /// The same machine with what hangs on it beside the chain.
+    ///
+    /// # Errors
+    /// If a frame or joint is named twice, stands on no frame of the machine, or states what only a chain that is measured can have.
+    pub fn with_side_branches(
+        mut self,
+        side_branches: Vec<SideBranch>,
+    ) -> Result<Self, (String, MachineFault)> {
+        let own = |dyad: &Dyad| {
+            let joint = dyad.joint.as_ref().map(|joint| joint.name.clone());
+            [Some(dyad.frame.clone()), joint].into_iter().flatten().collect::<Vec<_>>()
+        };
+        let mut names: BTreeSet<String> = self.dyads.iter().flat_map(own).collect();
+        for (b, branch) in side_branches.iter().enumerate() {
+            let path = format!("side_branches[{b}]");
+            if self.frame_index(&branch.on).is_none() {
+                let known = self.dyads.iter().map(|d| d.frame.as_str()).collect::<Vec<_>>().join(", ");
+                let fault = MachineFault::UnknownFrame { frame: branch.on.clone(), known };
+                return Err((format!("{path}.on"), fault));
+            }
+            for (i, dyad) in branch.dyads.iter().enumerate() {
+                self.check_side(dyad, &format!("{path}.dyads[{i}]"), &mut names)?;
+            }
+        }
+        self.side_branches = side_branches;
+        Ok(self)
+    }
+
+    fn check_side(&self, dyad: &Dyad, path: &str, names: &mut BTreeSet<String>) -> Checked<()> {
+        usable_name(&format!("{path}.frame"), "frame", &dyad.frame)?;
+        check_dyad(dyad, path, self.units)?;
+        let twice = |what: &str, name: &str| MachineFault::NameTwice { what: what.into(), name: name.into() };
+        if !names.insert(dyad.frame.clone()) {
+            return Err((format!("{path}.frame"), twice("frame", &dyad.frame)));
+        }
+        let says = |field: &str, what: &str| {
+            let what = format!("frame \"{}\" of a side branch states {what}", dyad.frame);
+            Err((format!("{path}.{field}"), MachineFault::BadSideBranch { what }))
+        };
+        if dyad.tolerance.is_some() {
+            return says("tolerance", "a tolerance");
+        }
+        let Some(joint) = &dyad.joint else { return Ok(()) };
+        if joint.name != dyad.frame && !names.insert(joint.name.clone()) {
+            return Err((format!("{path}.joint.name"), twice("joint", &joint.name)));
+        }
+        match (&joint.follows, &joint.nc) {
+            (Some(_), _) => says("joint.follows", "what its joint follows"),
+            (_, Some(_)) => says("joint.nc", "an NC word"),
+            _ => Ok(()),
+        }
+    }
+
+    /// The joint of a side branch that has this name.
+    pub fn side_joint(&self, name: &str) -> Option<&Joint> {
+        let dyads = self.side_branches.iter().flat_map(|side| &side.dyads);
+        dyads.filter_map(|dyad| dyad.joint.as_ref()).find(|joint| joint.name == name)
+    }
+
+    /// What hangs on the machine beside its chain.
+    pub fn side_branches(&self) -> &[SideBranch] {
+        &self.side_branches
+    }
+}
