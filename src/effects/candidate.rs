@@ -8,7 +8,7 @@ use super::library::Library;
 use super::place::{Place, Slot, joint_name, places};
 use crate::feature::{Binding, Dimension, Expression, Feature, Scope, Unbound, dimension_of};
 use crate::lie::Twist;
-use crate::machine::Machine;
+use crate::machine::{Dyad, Machine};
 use crate::units::Unit;
 
 /// One summand: coefficient × feature × direction in a slot.
@@ -366,7 +366,9 @@ fn in_each_setup(
 fn has_masses(machine: &Machine, j: usize) -> bool {
     let beyond =
         machine.dyads().iter().enumerate().skip(j).filter(|(k, _)| machine.branch(*k) == machine.branch(j));
-    beyond.into_iter().any(|(_, dyad)| dyad.mass.is_some_and(|m| m.mass > 0.0))
+    let sides = machine.side_branches().iter().filter(|side| machine.carries(j, side));
+    let weighs = |dyad: &Dyad| dyad.mass.is_some_and(|m| m.mass > 0.0);
+    beyond.into_iter().any(|(_, dyad)| weighs(dyad)) || sides.flat_map(|side| &side.dyads).any(weighs)
 }
 
 /// The feature, if the recordings have all that it needs.

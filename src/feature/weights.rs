@@ -72,7 +72,7 @@ fn carried(machine: &Machine, own: usize) -> Vec<Body> {
     let mut bodies: Vec<Body> = (own..end).map(Body::Chain).collect();
     let mut first = 0;
     for side in machine.side_branches() {
-        if machine.frame_index(&side.on).is_some_and(|on| (own..end).contains(&on)) {
+        if machine.carries(own, side) {
             bodies.extend((first..first + side.dyads.len()).map(Body::Side));
         }
         first += side.dyads.len();
@@ -94,11 +94,7 @@ fn dyad_of(machine: &Machine, body: Body) -> &Dyad {
 
 /// Columns that a recording needs to say how the side branches stand that a joint carries: name and unit.
 pub(super) fn columns(machine: &Machine, own: usize) -> Vec<(String, String)> {
-    let is_carried = |side: &&SideBranch| {
-        let on = machine.frame_index(&side.on);
-        on.is_some_and(|on| on >= own && machine.branch(on) == machine.branch(own))
-    };
-    let sides = machine.side_branches().iter().filter(is_carried);
+    let sides = machine.side_branches().iter().filter(|side| machine.carries(own, side));
     sides.flat_map(SideBranch::columns).map(|(name, unit)| (name.into(), unit.into())).collect()
 }
 

@@ -88,6 +88,11 @@ impl Machine {
         dyads.filter_map(|dyad| dyad.joint.as_ref()).find(|joint| joint.name == name)
     }
 
+    /// Whether a side branch is carried by the joint of dyad `j`.
+    pub fn carries(&self, j: usize, side: &SideBranch) -> bool {
+        self.frame_index(&side.on).is_some_and(|on| on >= j && self.branch(on) == self.branch(j))
+    }
+
     /// What hangs on the machine beside its chain.
     pub fn side_branches(&self) -> &[SideBranch] {
         &self.side_branches

@@ -176,7 +176,11 @@ impl Reader<'_> {
             let mut parts = bound.iter().flat_map(|(_, parts)| parts);
             if let Some((name, unit)) = parts.find_map(|part| part.feature.channels().into_iter().next()) {
                 let what = format!("{named} depends on {name}[{unit}], which is not simulated");
-                return fail(path, what, "leave it out");
+                return fail(
+                    path,
+                    what,
+                    "leave it out; if that is a joint of a side branch, leave the branch out of the machine file",
+                );
             }
             faults.effects.push(effect.clone());
         }

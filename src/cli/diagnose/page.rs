@@ -183,12 +183,11 @@ fn against(curve: &Curve, finding: Option<&Finding>, most: usize) -> Markup {
             let line: Vec<(f64, f64)> = run.iter().map(|p| (p.x * x_factor, p.effect * factor)).collect();
             envelope(&line, (most * run.len()).div_ceil(points.len()).max(2))
         };
-        let runs = curve.runs.iter().filter(|run| run.len() > 1).map(line).collect();
-        layers.push(Layer {
-            colour: CURVE,
-            name: "what this finding explains".into(),
-            marks: Marks::Lines(runs),
-        });
+        let marks = match is_scattered(curve) {
+            true => Marks::Dots(points.iter().map(|p| (p.x * x_factor, p.effect * factor)).collect()),
+            false => Marks::Lines(curve.runs.iter().filter(|run| run.len() > 1).map(line).collect()),
+        };
+        layers.push(Layer { colour: CURVE, name: "what this finding explains".into(), marks });
     }
     let caption = match finding {
         Some(_) => {
@@ -235,6 +234,19 @@ fn along(trace: &Trace, found: bool, most: usize) -> Markup {
         layers,
     };
     figure(&plot, &trace.recording)
+}
+
+/// From one sample to the next, poses that come in no order go farther than this part of the whole range.
+const FAR: f64 = 0.15;
+
+/// Whether neighbours in time lie anywhere along it, so that no line joins them.
+fn is_scattered(curve: &Curve) -> bool {
+    let x = || curve.runs.iter().flatten().map(|p| p.x);
+    let range = x().fold(f64::NEG_INFINITY, f64::max) - x().fold(f64::INFINITY, f64::min);
+    let mut steps: Vec<f64> =
+        curve.runs.iter().flat_map(|run| run.windows(2).map(|w| (w[1].x - w[0].x).abs())).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).is_some_and(|step| *step > FAR * range)
 }
 
 /// A line cut at its gaps.
