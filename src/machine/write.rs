@@ -52,12 +52,20 @@ pub(crate) fn to_text(form: &MachineForm) -> String {
     format!("Machine{}\n", one_entry_a_line(&text))
 }
 
-/// Lists below the second level (those of a calibration) come out on one line; here each entry gets its own.
+/// Lists below the second level (those of a calibration or a side branch) come out on one line; here each entry gets its own.
 fn one_entry_a_line(text: &str) -> String {
     let mut out = String::with_capacity(text.len() + 256);
     for line in text.split_inclusive('\n') {
         if let Some(effects) = line.strip_prefix(EFFECTS) {
             out.push_str(&format!("{EFFECTS}{}", one_field_a_line(effects)));
+            continue;
+        }
+        let side = line.strip_prefix(SIDE_BRANCH).and_then(|rest| rest.split_once(", dyads: [("));
+        if let Some((on, dyads)) =
+            side.and_then(|(on, rest)| Some((on, rest.trim_end().strip_suffix(")]),")?)))
+        {
+            let dyads = dyads.replace("), (frame: ", "),\n            (frame: ");
+            out.push_str(&format!("{SIDE_BRANCH}{on}, dyads: [\n            ({dyads}),\n        ]),\n"));
             continue;
         }
         let list = line.starts_with("        ").then(|| line.split_once(": [(")).flatten();
@@ -73,6 +81,9 @@ fn one_entry_a_line(text: &str) -> String {
     }
     out
 }
+
+/// How the line of a side branch begins.
+const SIDE_BRANCH: &str = "        (on: ";
 
 /// How the line of a calibration's effects begins.
 const EFFECTS: &str = "        effects: [";
