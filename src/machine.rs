@@ -14,7 +14,7 @@ mod write;
 pub use dyad::{Dyad, Joint, JointKind, MassPoint, NcWord, Placement, Tolerance};
 pub use fault::MachineFault;
 pub(crate) use form::{AngleUnit, LengthUnit, MachineForm, UnitsForm};
-pub(crate) use read::at_path;
+pub(crate) use read::{at_path, is_usable_name};
 pub use side::SideBranch;
 pub(crate) use write::{in_unit, to_text};
 

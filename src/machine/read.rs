@@ -247,11 +247,16 @@ fn sayable(si: f64, unit: Unit) -> f64 {
 }
 
 pub(super) fn usable_name(path: &str, what: &str, name: &str) -> Checked<()> {
-    let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
-    if name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.len() <= 64 && name.chars().all(fits) {
+    if is_usable_name(name) {
         return Ok(());
     }
     Err((path.into(), MachineFault::BadName { what: what.into(), name: name.into() }))
+}
+
+/// Whether recordings can use a name: letters, digits, `_`, `-` and `.`, beginning with a letter, 64 at most.
+pub(crate) fn is_usable_name(name: &str) -> bool {
+    let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.len() <= 64 && name.chars().all(fits)
 }
 
 fn tolerance(form: ToleranceForm, units: FileUnits, path: &str) -> Checked<Tolerance> {

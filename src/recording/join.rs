@@ -9,6 +9,7 @@ use super::column::{Cell, cells, unit};
 use super::text::{self, Fail};
 use super::{Source, error};
 use crate::error::{Error, Result};
+use crate::machine::is_usable_name;
 use crate::units::Unit;
 
 /// Columns are the same if they differ by no more than this part of their range.
@@ -35,8 +36,7 @@ pub struct Joined {
 /// [`Error::File`], or [`Error::Recording`] with line and column: rows that are not as many, no column that changes and is the same in both,
 /// what is no number.
 pub fn join(own: &Path, other: &Path, name: &str) -> Result<Joined> {
-    let fits = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
-    if !(name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(fits)) {
+    if !is_usable_name(name) {
         let fault = Fault::JoinName { name: text::shown(name.as_bytes()) };
         return Err(error(other, Fail::at(0, 0, fault)));
     }
