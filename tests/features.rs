@@ -66,6 +66,23 @@ fn take_up_remembers_where_an_interrupted_loop_stood() {
 }
 
 #[test]
+fn a_late_axis_is_where_it_was_a_moment_ago_and_where_it_was_sent_when_nobody_knows_the_time() {
+    // 10 mm/s from rest to rest; what is 20 ms late is 0.2 mm behind, whatever it is a function of.
+    let path: Vec<f64> = (0..60).map(|k| 0.1 * f64::from((k - 10i32).clamp(0, 40))).collect();
+    let (machine, mut samples) = along(&path);
+    let (sent, late) =
+        (feature(&machine, "Power(Position, 2)", &[]), feature(&machine, "Power(Late(0.02), 2)", &[]));
+    let (at, by_then) = (sent.over(&samples, &[]), late.over(&samples, &[]));
+    let behind: Vec<f64> = at.iter().zip(&by_then).map(|(x, y)| x.sqrt() - y.sqrt()).collect();
+    close(&behind[20..40], &[0.2e-3; 20], 1e-9);
+    close(&behind[..5], &[0.0; 5], 1e-12);
+    for joint in samples.iter_mut().flat_map(|s| s.joints.iter_mut().flatten()) {
+        joint.velocity.clear();
+    }
+    close(&late.over(&samples, &[]), &at, 0.0);
+}
+
+#[test]
 fn history_goes_on_across_stretches() {
     let (machine, samples) = along(&[0.0, 5.0, 4.0, 5.0, 50.0, 49.0]);
     let take_up = feature(&machine, "TakeUp(Value(1, \"mm\"))", &[]);

@@ -28,6 +28,7 @@ impl Rows<'_> {
         table: &mut [Option<Best>],
     ) {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
+        let usual = self.usual_sizes(candidate, grid);
         let level = &self.coarse.levels()[number];
         let (space, left) = self.on_level(field, number);
         let answers: Vec<Vec<Arc<Vec<f64>>>> = (candidate.coefficients.iter())
@@ -52,7 +53,7 @@ impl Rows<'_> {
                 from += rows;
             }
             let gram = own.tr_mul(&own) - along.tr_mul(&along);
-            table[*i] = Some(best(candidate, &grid[*i], &lengths, &gram, &g, heat));
+            table[*i] = Some(best(candidate, &grid[*i], &lengths, &gram, &g, heat, usual));
         }
         for batch in everywhere.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
@@ -67,7 +68,7 @@ impl Rows<'_> {
                 }
             }
             judge(&joined.columns(0, k * batch.len()), space, left, batch, &mut |i, gram, g| {
-                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat));
+                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat, usual));
             });
         }
     }

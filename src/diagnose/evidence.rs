@@ -10,6 +10,17 @@ const STEP: f64 = 4.0;
 const MORE: usize = 9;
 const RARER: f64 = 2.0;
 
+/// Logarithm of how much rarer the larger size of this number is, where so many are usual.
+pub(super) fn rarity(number: usize, usual: usize) -> f64 {
+    -RARER * number.saturating_sub(usual) as f64
+}
+
+/// How many of the larger sizes reach up to so many usual ones.
+pub(super) fn sizes_up_to(times: f64) -> usize {
+    let steps = (times / SIZES[SIZES.len() - 1]).max(1.0).ln() / STEP.ln();
+    (steps.ceil() as usize).min(MORE)
+}
+
 /// What columns are worth.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Worth {
@@ -22,8 +33,14 @@ pub(super) struct Worth {
 }
 
 /// Evidence of the first `length` columns, whose coefficients are normal with the sizes usual on machines, or larger where the
-/// recordings ask for that.
-pub(super) fn evidence(gram: &DMatrix<f64>, g: &DVector<f64>, length: usize, heat: f64) -> Worth {
+/// recordings ask for that; so many of the larger sizes are usual too.
+pub(super) fn evidence(
+    gram: &DMatrix<f64>,
+    g: &DVector<f64>,
+    length: usize,
+    heat: f64,
+    usual: usize,
+) -> Worth {
     let (gram, g) = (gram.view((0, 0), (length, length)), g.rows(0, length).into_owned());
     // Logarithm, gain, root mean square of the coefficients over the size.
     let with = |size: f64| {
@@ -50,7 +67,7 @@ pub(super) fn evidence(gram: &DMatrix<f64>, g: &DVector<f64>, length: usize, hea
     while held && beyond.len() < MORE {
         size *= STEP;
         let Some((log, gain, large)) = with(size) else { break };
-        let log = log - RARER * (beyond.len() + 1) as f64;
+        let log = log + rarity(beyond.len() + 1, usual);
         worth.gain = worth.gain.max(gain);
         held = large > 1.0;
         if log > best {
@@ -98,6 +115,20 @@ pub(super) fn log_mean_exp(logs: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sizes_that_are_usual_cost_nothing() {
+        // A thousand times the usual size, seen to a thousandth of it.
+        let (gram, g) = (DMatrix::from_element(1, 1, 1e6), DVector::from_element(1, 1e9));
+        let steps = sizes_up_to(1000.0);
+        assert_eq!(steps, 4);
+        let (rare, usual) = (evidence(&gram, &g, 1, 1.0, 0), evidence(&gram, &g, 1, 1.0, steps));
+        let grown = usual.evidence - rare.evidence;
+        assert!((grown - RARER * steps as f64).abs() < 1.5, "{grown}");
+        // What is no larger than usual is worth the same.
+        let g = DVector::from_element(1, 1e6);
+        assert_eq!(evidence(&gram, &g, 1, 1.0, 0).evidence, evidence(&gram, &g, 1, 1.0, steps).evidence);
+    }
 
     #[test]
     fn what_is_hardly_seen_is_no_larger_than_what_is_seen() {

@@ -79,6 +79,12 @@ fn foretold_without(search: &Search, active: &[Active]) -> Option<Vec<f64>> {
     Some((0..active.len()).map(without).collect())
 }
 
+/// Whether stretches that are left out are foretold better by these effects than by others, (68).
+pub(super) fn foretell_better(search: &Search, these: &[Active], others: &[Active]) -> bool {
+    let foretold = |active: &[Active]| Normal::new(search, active)?.foretold(&|_| true);
+    foretold(these).zip(foretold(others)).is_some_and(|(these, others)| these > others)
+}
+
 /// By how much better they are foretold by geometry alone, as a logarithm.
 fn foretold_without_all(search: &Search, active: &[Active]) -> Option<f64> {
     let normal = Normal::new(search, active)?;

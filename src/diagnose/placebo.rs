@@ -48,9 +48,10 @@ pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Ma
         let raw = rows.raw_elsewhere(own, &effect.score.parameters, part as f64 / PARTS as f64)?;
         let mut white = raw.clone();
         rows.whiten(&mut white);
+        let usual = rows.usual_sizes(own, std::slice::from_ref(&effect.score.parameters));
         let (at, mut score) = (&effect.score.parameters, None);
         judge(&white.as_view(), &field.space, &field.left, &[0], &mut |_, gram, g| {
-            score = Some(best(own, at, &lengths(own), gram, g, search.heat).at(at));
+            score = Some(best(own, at, &lengths(own), gram, g, search.heat, usual).at(at));
         });
         Some(of("the weights of other poses".into(), &score?, &raw))
     });

@@ -1,5 +1,6 @@
 //! Parameters between the points of the grid: a candidate may be much better there.
 
+use super::enter::solved;
 use super::score::{Field, Rows, Score};
 use super::search::Rival;
 use crate::effects::{Candidate, Parameter};
@@ -14,6 +15,10 @@ const HALVINGS: usize = 9;
 /// A wave of half the period comes first unless it falls behind by this, a logarithm: hardly any machine's error is nothing but an
 /// overtone.
 const OVERTONE: f64 = 4.0;
+
+/// Sine and cosine; a wave whose own ones are smaller than this part of its overtone's is that overtone.
+const PAIR: usize = 2;
+const ALONE: f64 = 0.1;
 
 /// Weight of what cannot be.
 const NEVER: f64 = -1e6;
@@ -32,9 +37,27 @@ pub(super) fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &
     let weight = |r: &Rival| {
         let has_half =
             all.iter().any(|other| candidate.is_half(&other.score.parameters, &r.score.parameters));
-        r.weight - if has_half { OVERTONE } else { 0.0 }
+        match has_half {
+            true if is_overtone_alone(rows, candidate, &r.score, field) => NEVER,
+            true => r.weight - OVERTONE,
+            false => r.weight,
+        }
     };
     all.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))).cloned().unwrap_or(best)
+}
+
+/// Whether the wave itself is next to nothing beside its overtone: then that is the wave.
+fn is_overtone_alone(rows: &Rows, candidate: &Candidate, score: &Score, field: &Field) -> bool {
+    let Some(columns) = rows.of(candidate, &score.parameters).filter(|_| score.coefficients >= PAIR + PAIR)
+    else {
+        return false;
+    };
+    let columns = columns.columns(0, score.coefficients) * score.room;
+    let along = field.space.along(&columns.as_view());
+    let gram = columns.tr_mul(&columns) - along.tr_mul(&along);
+    let Some(solution) = solved(gram, &columns.tr_mul(&field.left)) else { return false };
+    let size = |from: usize| solution.rows(from, PAIR).norm();
+    size(0) < ALONE * size(PAIR)
 }
 
 /// The same from one point; the evidence over the grid grows alike.

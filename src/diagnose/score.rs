@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::coarse::{Coarse, Features};
-use super::evidence::{Worth, evidence, log_mean_exp};
+use super::evidence::{Worth, evidence, log_mean_exp, rarity, sizes_up_to};
 use super::space::Space;
 use super::waves::Wave;
 use super::whitener::Whitener;
@@ -208,6 +208,19 @@ impl<'a> Rows<'a> {
             .collect()
     }
 
+    /// How many sizes beyond the usual one are usual too.
+    pub(super) fn usual_sizes(&self, candidate: &Candidate, grid: &[Vec<f64>]) -> usize {
+        let unit = |at: &Vec<f64>| self.units(candidate, at).first().copied().filter(|unit| *unit > 0.0);
+        candidate.usual_to.zip(grid.first().and_then(unit)).map_or(0, |(to, unit)| sizes_up_to(to / unit))
+    }
+
+    /// Logarithm of how rare its size is, 0 for one that is usual.
+    pub fn rarity(&self, candidate: &Candidate, score: &Score) -> f64 {
+        let size = if score.room > ROOM { score.room / ROOM_BEYOND } else { 1.0 };
+        let usual = self.usual_sizes(candidate, std::slice::from_ref(&score.parameters));
+        rarity(sizes_up_to(size), usual)
+    }
+
     /// The best of candidate `i` over its grid, on blocks where that does. `heat`: by how much chance is larger than the noise says.
     pub fn screen(&self, i: usize, candidate: &Candidate, field: &Field, heat: f64) -> Option<Score> {
         let lengths = lengths(candidate);
@@ -240,7 +253,9 @@ impl<'a> Rows<'a> {
         }
         let kept = self.coarse.features(i, candidate, &self.linear.samples);
         self.table(candidate, &candidate.grid, field, kept, heat, &all, &mut table);
-        let rough = summary(&candidate.grid, &table, &all)?;
+        let mut rough = summary(&candidate.grid, &table, &all)?;
+        let halves = candidate.grid.iter().filter(|at| candidate.is_half(at, &rough.parameters)).cloned();
+        rough.also = halves.collect();
         let is_nothing = rough.at_best <= 0.0 && !candidate.jumps();
         if kept.is_none() || !self.whitener.remembers() || is_nothing {
             return Some(rough);
@@ -254,7 +269,7 @@ impl<'a> Rows<'a> {
         };
         let fine = looked_at.iter().filter_map(|at| self.score_at(candidate, at, field, heat));
         let fine = fine.max_by(|a, b| a.at_best.total_cmp(&b.at_best))?;
-        Some(Score { evidence: rough.evidence + fine.at_best - rough.at_best, ..fine })
+        Some(Score { evidence: rough.evidence + fine.at_best - rough.at_best, also: rough.also, ..fine })
     }
 
     /// Evidence at a single point, finely.
@@ -288,6 +303,7 @@ impl<'a> Rows<'a> {
             return self.coarse_table(candidate, grid, field, (*level, kept), heat, points, table);
         }
         let (space, left) = (&*field.space, &field.left);
+        let usual = self.usual_sizes(candidate, grid);
         for batch in points.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
             let mut built = Vec::new();
@@ -299,7 +315,7 @@ impl<'a> Rows<'a> {
                 }
             }
             judge(&joined.columns(0, k * built.len()), space, left, &built, &mut |i, gram, g| {
-                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat));
+                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat, usual));
             });
         }
     }
@@ -325,7 +341,7 @@ pub(super) fn judge(
     }
 }
 
-/// The best of a candidate at one point, over how many of its coefficients take part.
+/// The best of a candidate at one point, over how many of its coefficients take part. `usual`: sizes beyond the usual one that are usual too.
 pub(super) fn best(
     candidate: &Candidate,
     at: &[f64],
@@ -333,9 +349,10 @@ pub(super) fn best(
     gram: &DMatrix<f64>,
     g: &DVector<f64>,
     heat: f64,
+    usual: usize,
 ) -> Best {
     let lengths = if candidate.has_overtones(at) { lengths } else { &lengths[..1] };
-    let all: Vec<Worth> = lengths.iter().map(|length| evidence(gram, g, *length, heat)).collect();
+    let all: Vec<Worth> = lengths.iter().map(|length| evidence(gram, g, *length, heat, usual)).collect();
     let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
     let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
     let Worth { gain, size, .. } = all[best];

@@ -108,7 +108,7 @@ pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>, bool), Rc<Vec<Rival>>
 pub(super) type Mark = (usize, usize, Vec<u64>);
 
 /// So many candidates that came next to an effect are compared with it again and again.
-const NEAR: usize = 40;
+pub(super) const NEAR: usize = 40;
 /// Candidates with this part of the best one's weight come into question, and at most so many.
 const CLOSE: f64 = 0.6;
 const REFINED: usize = 8;
@@ -137,7 +137,7 @@ const GROUNDS: usize = 12;
 const MOST: usize = 8;
 const MOST_IN_MOTION: usize = 5;
 /// Logarithm of the odds at which an effect is taken in.
-const ENTER: f64 = 8.0;
+pub(super) const ENTER: f64 = 8.0;
 
 impl Search<'_> {
     /// Evidence of every candidate beside the active effects, better first.
@@ -165,7 +165,7 @@ impl Search<'_> {
         rivals
     }
 
-    fn compare(&self, space: Arc<Space>, among: Option<&[usize]>) -> Vec<Rival> {
+    pub(super) fn compare(&self, space: Arc<Space>, among: Option<&[usize]>) -> Vec<Rival> {
         let field = self.rows.field(space);
         // What progress is told is no matter of the threads.
         let (rows, priors, candidates, heat) = (self.rows, &self.priors, self.candidates, self.heat);
@@ -225,7 +225,7 @@ impl Search<'_> {
 
     /// The space beside all active effects but one, their shapes as the families' where they would depart too far: what is hidden there
     /// is another effect, or unexplained.
-    fn ground(&self, active: &[Active], but: Option<usize>) -> Arc<Space> {
+    pub(super) fn ground(&self, active: &[Active], but: Option<usize>) -> Arc<Space> {
         let others = all_but(active, but);
         let hidden = but.is_some_and(|i| active[i].hidden);
         let marks = (others.iter().map(Active::mark).collect(), hidden);

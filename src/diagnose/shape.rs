@@ -159,6 +159,11 @@ pub(super) fn is_of_curve(curve: &Candidate, other: &Candidate) -> bool {
         && motions(other).iter().all(|motion| motions(curve).contains(motion))
 }
 
+/// Whether it is a curve along the travel of a joint, of any form.
+pub(super) fn is_curve(candidate: &Candidate) -> bool {
+    candidate.parameters.is_empty() && is_along_travel(candidate) && candidate.coefficients.len() > 2
+}
+
 /// Whether it depends on where one joint stands and on nothing else, and is no wave.
 fn is_along_travel(candidate: &Candidate) -> bool {
     is_of_position(candidate) && candidate.features.iter().all(|f| f.wave().is_none())

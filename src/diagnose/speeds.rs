@@ -1,6 +1,6 @@
 //! Whether speeds allow to tell what goes with velocity from what goes with direction.
 
-use super::search::{Rival, Search};
+use super::search::{Active, Rival, Search};
 use crate::effects::Candidate;
 use crate::feature::Feature;
 
@@ -10,25 +10,46 @@ const AT_SPEED: f64 = 0.5;
 const ONE: f64 = 0.995;
 /// Cosine between two columns that do much the same at speed.
 const ALIKE: f64 = 0.9;
+/// The other name is taken where it is likelier by this, as a logarithm.
+const LIKELIER: f64 = 2.0;
 
-/// Rivals with what speeds do not allow to tell from `own` as likely as it is, but for how often each is met: where there is one speed
-/// only, a lag and play differ in starts and stops alone, and those hang on shapes that nobody knows.
+/// Rivals with what speeds do not allow to tell from `own` as likely as it is, but for how often each is met and how rare its size is:
+/// where there is one speed only, a lag and play differ in starts and stops alone, and those hang on shapes that nobody knows.
 pub(super) fn levelled(search: &Search, own: &Rival, rivals: Vec<Rival>) -> Vec<Rival> {
-    let candidate = |r: &Rival| &search.candidates[r.candidate];
-    let level = |r: Rival| {
-        let pair = match (by_velocity(candidate(own)), by_velocity(candidate(&r))) {
-            (true, false) if by_direction(candidate(&r)) => Some((own, &r)),
-            (false, true) if by_direction(candidate(own)) => Some((&r, own)),
-            _ => None,
-        };
-        if !pair.is_some_and(|(lag, play)| is_one_at_speed(search, lag, play)) {
-            return r;
-        }
-        let prior = |r: &Rival| search.priors[r.candidate];
-        let weight = own.weight - prior(own) + prior(&r);
-        Rival { weight: weight.max(r.weight), ..r }
+    let level = |r: Rival| match level_with(search, own, &r) {
+        Some(weight) => Rival { weight, ..r },
+        None => r,
     };
     rivals.into_iter().map(level).collect()
+}
+
+/// Effects of which one speed says no more than of another name, as that other one where its size is less rare: two degrees of play are
+/// a rare thing, a delay of 30 ms is not.
+pub(super) fn less_rare(search: &Search, active: Vec<Active>) -> Vec<Active> {
+    let mut active = active;
+    for i in 0..active.len() {
+        let rivals = search.rivals_of(&active, i);
+        let Some(own) = rivals.iter().find(|r| r.candidate == active[i].candidate) else { continue };
+        let levelled = rivals.iter().filter_map(|r| Some((level_with(search, own, r)?, r)));
+        let best = levelled.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(w, _)| *w > own.weight + LIKELIER);
+        let Some((_, other)) = best else { continue };
+        if let Some(entered) = search.settle(other, &search.ground(&active, Some(i))) {
+            active[i] = entered.instead_of(&active[i]);
+        }
+    }
+    active
+}
+
+/// What a rival weighs where speeds do not allow to tell it from `own`; `None` where they do.
+fn level_with(search: &Search, own: &Rival, r: &Rival) -> Option<f64> {
+    let candidate = |r: &Rival| &search.candidates[r.candidate];
+    let (lag, play) = match (by_velocity(candidate(own)), by_velocity(candidate(r))) {
+        (true, false) if by_direction(candidate(r)) => (own, r),
+        (false, true) if by_direction(candidate(own)) => (r, own),
+        _ => return None,
+    };
+    let beforehand = |r: &Rival| search.priors[r.candidate] + search.rows.rarity(candidate(r), &r.score);
+    is_one_at_speed(search, lag, play).then(|| own.weight - beforehand(own) + beforehand(r))
 }
 
 fn by_velocity(candidate: &Candidate) -> bool {

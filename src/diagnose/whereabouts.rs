@@ -85,7 +85,7 @@ pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Opti
         let mut standing = None;
         let count = columns.ncols();
         judge(&columns.columns(0, count), space, left, &[0], &mut |_, gram, g| {
-            let Worth { evidence, gain, .. } = evidence(gram, g, count, heat);
+            let Worth { evidence, gain, .. } = evidence(gram, g, count, heat, 0);
             standing = Some(Standing { place: series.place, evidence, gain });
         });
         standing

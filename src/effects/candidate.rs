@@ -88,6 +88,8 @@ pub struct Candidate {
     pub least: usize,
     /// How often it is met, against 1 for backlash.
     pub often: f64,
+    /// Coefficients up to this, SI, are usual whatever the deviation that they make.
+    pub usual_to: Option<f64>,
     /// For effects that are spread: what their variance depends on.
     pub scatter: Option<Feature>,
 }
@@ -332,6 +334,7 @@ fn candidate(
         grid: grid::points(&family.parameters, &ranges, travel, facts),
         least: family.least.unwrap_or(family.features.len()).min(own_features.len()),
         often: family.often,
+        usual_to: family.usual_to,
     })
 }
 

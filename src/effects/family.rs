@@ -47,6 +47,10 @@ pub struct Family {
     /// Size of the deviation, root mean square, that is usual on machines in use.
     #[serde(default)]
     pub size: Size,
+    /// Coefficients up to this, SI, are usual however large the deviation becomes by what they multiply: a delay is as long as the
+    /// control makes it, and what it does grows with the speed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usual_to: Option<f64>,
     /// Tried only where the recordings last this long, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lasts: Option<f64>,

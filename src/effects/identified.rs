@@ -410,7 +410,10 @@ impl StoredEffect {
             let ((a, b, c), (d, e, f)) = (part.v, part.w);
             let direction = [a, b, c, d, e, f];
             let endless = |e: &Expression| match e {
-                Expression::Number(x) | Expression::Value(x, _) | Expression::TimeSince(x) => !x.is_finite(),
+                Expression::Number(x)
+                | Expression::Value(x, _)
+                | Expression::TimeSince(x)
+                | Expression::Late(x) => !x.is_finite(),
                 Expression::OrderIn(begins) | Expression::BeginningIn(begins) => {
                     begins.iter().any(|(_, n)| !n.is_finite())
                 }

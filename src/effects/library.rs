@@ -241,9 +241,8 @@ fn check(family: &Family) -> Checked<()> {
         let what = format!("at least {} of {} features", family.least.unwrap_or(0), family.features.len());
         return Err(("least".into(), fault(what, "write a number from 1 to the number of features")));
     }
-    for (path, value) in
-        [("often", family.often), ("size.um", family.size.um), ("size.urad", family.size.urad)]
-    {
+    let numbers = [("often", family.often), ("size.um", family.size.um), ("size.urad", family.size.urad)];
+    for (path, value) in numbers.into_iter().chain(family.usual_to.map(|to| ("usual_to", to))) {
         if !(value.is_finite() && value > 0.0) {
             return Err((
                 path.into(),

@@ -19,6 +19,8 @@ pub(super) enum Node {
     Number(f64),
     Parameter(usize),
     Joint(usize, Column),
+    /// Where a joint is when it is so many seconds late.
+    Late(usize, f64),
     Time(f64),
     /// Names of recordings, and with which number they begin; whether the number of the own recording's beginning is meant.
     Order(Vec<(String, f64)>, bool),
@@ -213,6 +215,24 @@ impl Feature {
         feature
     }
 
+    /// Where positions of a joint stand in it: as they are when that joint follows its command so many seconds late.
+    pub(crate) fn late(&self, joint: usize, by: f64) -> Self {
+        let mut feature = self.clone();
+        delay(&mut feature.node, joint, by);
+        feature
+    }
+
+    /// The joint of which it is the velocity, turned round: what a lag is multiplied with.
+    pub(crate) fn lags(&self) -> Option<usize> {
+        match &self.node {
+            Node::Product(list) => match list.as_slice() {
+                [Node::Number(sign), Node::Joint(j, Column::Velocity)] if *sign == -1.0 => Some(*j),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
     /// What it is the sine (`false`) or cosine (`true`) of, if it is one and has no history.
     pub fn wave(&self) -> Option<(bool, Feature)> {
         let (cosine, inner) = match &self.node {
@@ -284,9 +304,10 @@ impl Feature {
     pub fn joints(&self) -> Vec<usize> {
         let mut joints = Vec::new();
         each(&self.node, &mut |n| match n {
-            Node::Joint(j, _) | Node::Play { joint: j, .. } | Node::TakeUp { joint: j, .. } => {
-                joints.push(*j)
-            }
+            Node::Joint(j, _)
+            | Node::Late(j, _)
+            | Node::Play { joint: j, .. }
+            | Node::TakeUp { joint: j, .. } => joints.push(*j),
             _ => {}
         });
         joints.sort_unstable();
@@ -349,6 +370,7 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
             Node::Between(Box::new(Node::Joint(j, Column::Position)), from, to)
         }
         E::Time => Node::Time(b.time.ok_or(Unbound::NoTime)?.0),
+        E::Late(by) => Node::Late(own()?, *by),
         E::TimeSince(since) => Node::Time(*since),
         E::Order => Node::Order(b.begins.to_vec(), false),
         E::Beginning => Node::Order(b.begins.to_vec(), true),
@@ -421,6 +443,7 @@ fn parts(node: &Node) -> Vec<&Node> {
         Node::Number(_)
         | Node::Parameter(_)
         | Node::Joint(..)
+        | Node::Late(..)
         | Node::Time(_)
         | Node::Order(..)
         | Node::Channel(..) => Vec::new(),
@@ -444,6 +467,7 @@ fn parts_mut(node: &mut Node) -> Vec<&mut Node> {
         Node::Number(_)
         | Node::Parameter(_)
         | Node::Joint(..)
+        | Node::Late(..)
         | Node::Time(_)
         | Node::Order(..)
         | Node::Channel(..) => Vec::new(),
@@ -476,6 +500,13 @@ fn replace(node: &mut Node, parameters: &[f64]) {
         *node = Node::Number(parameters[*index]);
     }
     parts_mut(node).into_iter().for_each(|part| replace(part, parameters));
+}
+
+fn delay(node: &mut Node, joint: usize, by: f64) {
+    if *node == Node::Joint(joint, Column::Position) {
+        *node = Node::Late(joint, by);
+    }
+    parts_mut(node).into_iter().for_each(|part| delay(part, joint, by));
 }
 
 fn renumber(node: &mut Node, by: usize) {

@@ -81,7 +81,7 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
         Parameter(name) => (scope.parameter)(name).ok_or_else(|| {
             fault(format!("parameter \"{name}\" is not declared"), "add it to the family's `parameters`")
         }),
-        Position | SinceReversal | Travelled => Ok(Dimension::of_joint(own()?)),
+        Position | Late(_) | SinceReversal | Travelled => Ok(Dimension::of_joint(own()?)),
         Velocity => Ok(Dimension::of_joint(own()?).over(Dimension::TIME)),
         Acceleration => Ok(Dimension::of_joint(own()?).over(Dimension::TIME.power(2))),
         Stroke | Direction => own().map(|_| Dimension::ONE),

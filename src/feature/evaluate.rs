@@ -182,6 +182,17 @@ impl<S: Scalar> Pass<'_, S> {
             Node::Joint(j, column) => {
                 self.lifted(self.joint(*j).map_or(&[][..], |joint| joint.column(*column)))
             }
+            Node::Late(j, by) => {
+                let Some(joint) = self.joint(*j) else { return self.lifted(&[]) };
+                let late = |(x, v): (&f64, &f64)| x - by * v;
+                match joint.velocity.len() == joint.position.len() {
+                    true => {
+                        let column: Vec<f64> = joint.position.iter().zip(&joint.velocity).map(late).collect();
+                        self.lifted(&column)
+                    }
+                    false => self.lifted(&joint.position),
+                }
+            }
             Node::Time(since) => {
                 let time = self.samples.time.as_deref().unwrap_or(&[]);
                 self.lifted(time).map(|t| t.offset(-since))

@@ -30,6 +30,7 @@ pub(super) fn express(node: &Node, machine: &Machine, parameters: &[String]) -> 
                 Column::Weight(index) => weights::expression(machine, *j, *index),
             },
         ),
+        Node::Late(j, by) => of(*j, E::Late(*by)),
         Node::Time(since) => E::TimeSince(*since),
         Node::Order(begins, false) => E::OrderIn(begins.clone()),
         Node::Order(begins, true) => E::BeginningIn(begins.clone()),

@@ -101,6 +101,9 @@ pub enum Expression {
     Lag(Box<Expression>, Box<Expression>),
     /// Time since this moment on the recordings' clock, s. What `Time` becomes in a calibrated file.
     TimeSince(f64),
+    /// Where the own joint is when it follows its command so many seconds late, `x - τ v`; where its velocity is not known, it stands
+    /// where it was sent. What positions become in a calibrated file with a large lag.
+    Late(f64),
     /// Number of samples before this one where recordings of these names begin with these numbers; far beyond all of them in another
     /// recording. What `Order` becomes in a calibrated file.
     OrderIn(Vec<(String, f64)>),
@@ -140,7 +143,7 @@ impl Expression {
             Number(_) | Value(..) | Parameter(_) | Position | Stroke | Direction | Velocity
             | Acceleration | SinceReversal | Travelled | Gravity | Load | Moment(_) | Shear(_)
             | Lever(..) | Time | Clock | Beyond | Order | Beginning | Channel(..) | TimeSince(_)
-            | OrderIn(_) | BeginningIn(_) => Vec::new(),
+            | Late(_) | OrderIn(_) | BeginningIn(_) => Vec::new(),
         }
     }
 

@@ -66,6 +66,13 @@ fn write(e: &Expression, f: &mut fmt::Formatter<'_>, at_least: u8, mark: &str) -
         Position => name(f, "x"),
         Stroke => name(f, "s"),
         Direction => name(f, "σ"),
+        Late(by) => {
+            f.write_str("(")?;
+            name(f, "x")?;
+            write!(f, " - {by} ")?;
+            name(f, "v")?;
+            f.write_str(")")
+        }
         Velocity => name(f, "v"),
         Acceleration => name(f, "a"),
         SinceReversal => name(f, "d"),

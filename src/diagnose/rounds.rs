@@ -1,0 +1,192 @@
+//! One search from the constant geometry to what is said: rounds of judging the noise, of linearising the machine anew, of names.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+
+use super::bent;
+use super::coarse::Coarse;
+use super::diagnosis::Diagnosis;
+use super::folds;
+use super::late::{self, late};
+use super::noise::{self, Noise};
+use super::report;
+use super::score::Rows;
+use super::search::{Active, Search};
+use super::speeds::less_rare;
+use super::whitener::Whitener;
+use crate::effects::{Candidate, Library, RecordingFacts};
+use crate::error::Result;
+use crate::identify::{Linear, Options, linear};
+use crate::machine::Machine;
+use crate::recording::Recording;
+
+/// Rounds of judging the noise from what is left.
+const NOISE_ROUNDS: usize = 3;
+/// So many times the machine is linearised anew, where effects are so large that it has to be.
+const MOVES: usize = 3;
+/// Where chance is that much larger than the noise, the effects are chosen once more against it.
+const HOT: f64 = 3.0;
+/// What is left counts as more than noise beyond this many standard deviations of chance.
+const BEYOND_NOISE: f64 = 5.0;
+/// An effect without which the mean square of stretches left out falls by this factor runs wild there, whatever else speaks for it.
+const WILD: f64 = 2.0;
+
+/// What is diagnosed.
+pub(super) struct Case<'a> {
+    pub machine: &'a Machine,
+    pub recordings: &'a [Recording],
+    pub library: &'a Library,
+    pub facts: &'a RecordingFacts,
+    pub options: Options,
+    pub progress: &'a dyn Fn(&str),
+}
+
+/// What was said of a case.
+pub(super) struct Told {
+    pub diagnosis: Diagnosis,
+    /// A joint of which something is said that is so large that it is rare, and would be a lag's if that joint were late.
+    pub may_be_late: Option<usize>,
+}
+
+impl Case<'_> {
+    /// Everything that these candidates say of it.
+    ///
+    /// # Errors
+    /// As [`crate::identify::calibrate`].
+    pub fn told(&self, plain: &[Candidate]) -> Result<Told> {
+        let Case { machine, recordings, library, facts, progress, .. } = *self;
+        progress("fitting constant geometry");
+        let mut linear = linear(machine, recordings, self.options, &facts.dead_bands, progress)?;
+        let mut candidates = plain.to_vec();
+        let runs = noise::runs(&linear);
+        let mut coarse = Coarse::new(&linear, candidates.len());
+        let mut out = noise::outliers(&linear.residual, &runs, facts_are_smooth(facts));
+        if facts_are_smooth(facts) {
+            out.iter_mut().zip(noise::waiting(&linear)).for_each(|(out, waiting)| *out |= waiting);
+        }
+        let total: f64 = candidates.iter().map(|c| c.often).sum();
+        let priors: Vec<f64> = candidates.iter().map(|c| (c.often / total).ln()).collect();
+        let commonness = commonness(&candidates);
+        // Settled positions are few, and where none is repeated nothing tells their noise: every effect has to prove itself.
+        let most_wild = if facts_are_smooth(facts) { WILD } else { 1.0 };
+        // What is left is noise, once everything else is modelled: the noise is judged anew from it.
+        let mut noise = noise_of(&linear, &linear.residual, &runs, &out, facts);
+        let mut active = Vec::new();
+        let (mut round, mut moves, mut forgot) = (1, 0, false);
+        loop {
+            let rows =
+                Rows::new(&linear, &coarse, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
+            let search = Search {
+                rows: &rows,
+                runs: &runs,
+                base: rows.constant(),
+                candidates: &candidates,
+                priors: priors.clone(),
+                commonness: commonness.clone(),
+                progress,
+                heat: 1.0,
+                in_motion: facts_are_smooth(facts),
+                known: RefCell::default(),
+                grounds: RefCell::default(),
+            };
+            let judge = |active: &[Active]| {
+                noise_of(&linear, &report::residual_of(&search, active), &runs, &out, facts)
+            };
+            let is_settled = |judged: &[Noise]| noise.iter().zip(judged).all(|(a, b)| a.is_close(b));
+            active = search.run(&active, |active| round == NOISE_ROUNDS || is_settled(&judge(active)));
+            active = less_rare(&search, active);
+            let judged = judge(&active);
+            let report = |search: &Search, active: &[Active]| -> Told {
+                let diagnosis = report::report(search, active, machine, library, &noise);
+                Told { diagnosis, may_be_late: late::may_be_late(search, active) }
+            };
+            if moves < MOVES && !active.is_empty() {
+                if let Some(late) = late(&search, &active, plain) {
+                    (candidates, noise, moves) = (late, judged, moves + 1);
+                    coarse = Coarse::new(&linear, candidates.len());
+                    continue;
+                }
+                let moved = bent::straightened(&search, &active, machine, recordings, &facts.dead_bands)?;
+                if let Some(moved) = moved {
+                    (linear, noise, moves) = (moved, judged, moves + 1);
+                    continue;
+                }
+            }
+            if active.is_empty() && !forgot && noise.iter().any(Noise::is_long) {
+                // So long a memory may be a misfit that was taken for noise.
+                let left = search.leftover(&search.base);
+                if left.beyond > BEYOND_NOISE {
+                    (noise, forgot) = (noise.iter().map(Noise::shortened).collect(), true);
+                    continue;
+                }
+            }
+            if round == NOISE_ROUNDS || is_settled(&judged) {
+                let heat = search.leftover(&search.beside(&active, None)).heat;
+                if heat < HOT {
+                    let found = less_rare(&search, search.unfolded(active));
+                    let active = search.polished(&folds::useful(&search, &found, most_wild));
+                    return Ok(report(&search, &active));
+                }
+                // Much is left, as it always is on real machines: the simplest names that stand out from it count.
+                let search =
+                    Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
+                let found = less_rare(&search, search.unfolded(search.run(&active, |_| true)));
+                active = search.polished(&folds::useful(&search, &found, most_wild));
+                if moves < MOVES
+                    && let Some(late) = late(&search, &active, plain)
+                {
+                    (candidates, moves) = (late, moves + 1);
+                    coarse = Coarse::new(&linear, candidates.len());
+                    continue;
+                }
+                return Ok(report(&search, &active));
+            }
+            (noise, round) = (judged, round + 1);
+        }
+    }
+}
+
+/// Families that are met more often than this part of the most frequent one are common.
+const COMMON: f64 = 0.2;
+
+/// How rare the family of each candidate is: the logarithm of how often it is met, 0 for all common ones.
+fn commonness(candidates: &[Candidate]) -> Vec<f64> {
+    let mut met: HashMap<&str, f64> = HashMap::new();
+    for candidate in candidates {
+        *met.entry(&candidate.effect).or_default() += candidate.often;
+    }
+    let most = met.values().copied().fold(f64::MIN_POSITIVE, f64::max);
+    candidates.iter().map(|c| (met[c.effect.as_str()] / (COMMON * most)).min(1.0).ln()).collect()
+}
+
+fn facts_are_smooth(facts: &RecordingFacts) -> bool {
+    facts.time.is_some() && !facts.settled
+}
+
+/// Noise of every run; runs of the same quantity share theirs.
+fn noise_of(
+    linear: &Linear,
+    left: &[f64],
+    runs: &[Vec<usize>],
+    out: &[bool],
+    facts: &RecordingFacts,
+) -> Vec<Noise> {
+    let smooth = facts_are_smooth(facts);
+    let estimate = |angle: bool| {
+        let own: Vec<&Vec<usize>> =
+            runs.iter().filter(|run| run.first().is_some_and(|r| linear.angle[*r] == angle)).collect();
+        if facts.approached
+            && let Some(noise) = noise::repeated(linear, left, &own, out)
+        {
+            return noise;
+        }
+        match !smooth && facts.time.is_some() && noise::without_order(linear) {
+            true => noise::remembered(left, &own, out, linear.step(angle)),
+            false => noise::estimate(left, &own, out, smooth, linear.step(angle)),
+        }
+    };
+    let (length, angle) = (estimate(false), estimate(true));
+    runs.iter()
+        .map(|run| if run.first().is_some_and(|r| linear.angle[*r]) { angle } else { length })
+        .collect()
+}

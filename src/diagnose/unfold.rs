@@ -1,0 +1,74 @@
+//! A curve in the place of several names: what bends along a whole turn may be a line and the waves of an encoder, `docs/diagnosis.md` (75).
+
+use std::sync::Arc;
+
+use super::folds;
+use super::search::{Active, ENTER, NEAR, Search, all_but};
+use super::shape;
+use crate::effects::Candidate;
+
+/// A curve has at least so many coefficients.
+const CURVE: usize = 3;
+
+impl Search<'_> {
+    /// Effects with every curve along the travel of a joint resolved into other names at that joint, where these say more than it.
+    ///
+    /// Names come one by one, and no two of them need say as much as a curve of eight orders: only together do they.
+    pub fn unfolded(&self, active: Vec<Active>) -> Vec<Active> {
+        let is_curve = |effect: &Active| {
+            let candidate = &self.candidates[effect.candidate];
+            shape::is_curve(candidate) && effect.score.coefficients >= CURVE
+        };
+        let mut active = active;
+        let mut i = 0;
+        while i < active.len() {
+            match is_curve(&active[i]).then(|| self.resolved(&active, i)).flatten() {
+                Some(names) => active = names,
+                None => i += 1,
+            }
+        }
+        active
+    }
+
+    /// Effects with others in the place of curve `i`; `None` where they say no more.
+    fn resolved(&self, active: &[Active], i: usize) -> Option<Vec<Active>> {
+        let curve = &active[i];
+        let others = all_but(active, Some(i));
+        let alone = self.beside_names(&others);
+        let own = self.candidates[curve.candidate].place;
+        let is_simple =
+            |c: &usize| self.candidates[*c].place == own && is_line_or_order(&self.candidates[*c]);
+        let among: Vec<usize> = (0..self.candidates.len()).filter(is_simple).collect();
+        let field = self.rows.field(alone);
+        let candidate = &self.candidates[curve.candidate];
+        let score = self.rows.score_at(candidate, &curve.score.parameters, &field, self.heat)?;
+        let most = score.evidence + self.priors[curve.candidate];
+        let (mut names, mut sum): (Vec<Active>, f64) = (Vec::new(), 0.0);
+        while others.len() + names.len() < self.most() {
+            let space = Arc::new(self.beside_names(&[others.as_slice(), &names].concat()));
+            let rivals = self.compare(space.clone(), Some(&among));
+            let Some(next) = rivals.iter().find(|r| r.weight > ENTER && !self.repeats(r, &names)) else {
+                break;
+            };
+            let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
+            let weight = next.weight;
+            let Some(entered) = self.enter(next, &space) else { break };
+            names.push(Active { near, ..entered });
+            sum += weight;
+            let resolved = [others.as_slice(), &names].concat();
+            if sum > most + ENTER && folds::foretell_better(self, &resolved, active) {
+                return Some(resolved);
+            }
+        }
+        None
+    }
+}
+
+/// Whether it is a straight line along the travel of one joint, or a wave of so many a turn.
+fn is_line_or_order(candidate: &Candidate) -> bool {
+    let is_wave = candidate.features.iter().all(|f| f.wave().is_some());
+    shape::is_of_position(candidate)
+        && !shape::is_curve(candidate)
+        && candidate.parameters.iter().all(|p| p.whole)
+        && (is_wave || candidate.coefficients.len() == 1)
+}

@@ -1,0 +1,109 @@
+//! Resolvers out and back at one speed: their waves are named by what they come from, and their delay is no lost motion.
+
+mod common;
+
+use std::f64::consts::TAU;
+
+use kincal::diagnose::{Diagnosis, Finding, Request, diagnose};
+use kincal::effects::Library;
+use kincal::recording::Recording;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+/// Speed, deg/s; ramps, s; rest at either end, s; time between samples, s.
+const SPEED: f64 = 36.0;
+const RAMP: f64 = 0.1;
+const REST: f64 = 4.0;
+const STEP: f64 = 0.01;
+
+/// What a resolver makes of an axis.
+#[derive(Clone, Copy, Debug)]
+struct Resolver {
+    /// Waves per turn, their size in deg, and where they begin, rad.
+    order: u8,
+    amplitude: f64,
+    phase: f64,
+    /// What the reading is short of, part of the turn.
+    scale: f64,
+    /// s
+    delay: f64,
+}
+
+impl Resolver {
+    /// What is read of an axis that stands here, deg.
+    fn reads(&self, at: f64) -> f64 {
+        let turn = at.to_radians();
+        at * (1.0 + self.scale) + self.amplitude * (f64::from(self.order) * turn + self.phase).sin()
+    }
+}
+
+/// Where the axis is told to be, deg: a turn out, a rest, and back.
+fn command(t: f64) -> f64 {
+    // Way from rest, of a move that takes a turn.
+    let way = |t: f64| {
+        let (turn, whole) = (360.0, 360.0 / SPEED + RAMP);
+        match t {
+            t if t < 0.0 => 0.0,
+            t if t < RAMP => 0.5 * SPEED * t * t / RAMP,
+            t if t < whole - RAMP => SPEED * (t - 0.5 * RAMP),
+            t if t < whole => turn - 0.5 * SPEED * (whole - t).powi(2) / RAMP,
+            _ => turn,
+        }
+    };
+    let back = 2.0 * REST + 360.0 / SPEED + RAMP;
+    way(t - REST) - way(t - back)
+}
+
+/// Noise of unit variance; the sum of four even numbers is near enough to normal.
+fn normals(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed | 1;
+    move || {
+        let sum: f64 = (0..4)
+            .map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            })
+            .sum();
+        3f64.sqrt() * sum
+    }
+}
+
+fn diagnosis(resolver: Resolver, seed: u64) -> Result<Diagnosis, TestCaseError> {
+    let machine = common::machine("rotary_axis");
+    let mut noise = normals(seed);
+    let mut text = String::from("# measurement: joint\n# zero: unknown\nt[s],c[deg],c_meas[deg]\n");
+    let count = ((3.0 * REST + 2.0 * (360.0 / SPEED + RAMP)) / STEP) as usize;
+    for t in (0..count).map(|k| STEP * k as f64) {
+        let read = resolver.reads(command(t - resolver.delay)) + 0.02 * noise();
+        text += &format!("{t:.2},{:.5},{read:.5}\n", command(t));
+    }
+    let fail = |e: kincal::Error| TestCaseError::fail(e.to_string());
+    let recording = Recording::from_bytes("resolver.csv", text.into_bytes(), &machine).map_err(fail)?;
+    diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {}).map_err(fail)
+}
+
+proptest! {
+    // The same draws each time: now and then a wave is taken for the bend of a scale, as it may be on one turn.
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(10) })]
+
+    #[test]
+    fn the_delay_of_a_resolver_is_no_lost_motion_and_its_waves_have_their_order(
+        order in 2u8..7, amplitude in 1.0..8.0f64, phase in 0.0..TAU,
+        scale in -3e-3..3e-3f64, delay in 0.02..0.05f64, seed in any::<u64>(),
+    ) {
+        let resolver = Resolver { order, amplitude, phase, scale, delay };
+        let said = diagnosis(resolver, seed)?;
+        let size = |finding: &Finding, name: &str| {
+            finding.coefficients.iter().find(|c| c.name == name).map_or(f64::NAN, |c| c.value)
+        };
+        let found = |names: &[&str]| said.findings.iter().find(|f| names.contains(&f.effect.as_str()));
+        let is_near = |value: f64, truth: f64| (value / truth - 1.0).abs() < 0.1;
+        let late = found(&["servo_lag", "latency"]);
+        let late = late.map_or(f64::NAN, |f| size(f, if f.effect == "latency" { "delay" } else { "lag" }));
+        let wave = found(&["cyclic_error"]).map_or(f64::NAN, |f| size(f, "amplitude"));
+        let names: Vec<_> = said.findings.iter().map(|f| (&f.effect, &f.form)).collect();
+        prop_assert!(is_near(late, delay), "{late} s of {resolver:?}: {names:?}");
+        prop_assert!(is_near(wave, amplitude.to_radians()), "{wave} rad of {resolver:?}: {names:?}");
+        prop_assert!(found(&["backlash", "hysteresis", "direction_dependent_pose"]).is_none(), "{resolver:?}: {names:?}");
+    }
+}
