@@ -82,28 +82,36 @@ fn diagnosis(resolver: Resolver, seed: u64) -> Result<Diagnosis, TestCaseError> 
     diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {}).map_err(fail)
 }
 
+/// Size of a finding's number of this name, SI.
+fn size(finding: &Finding, name: &str) -> f64 {
+    finding.coefficients.iter().find(|c| c.name == name).map_or(f64::NAN, |c| c.value)
+}
+
+/// That its delay is found, and no lost motion, and its wave.
+fn is_told(resolver: Resolver, seed: u64) -> Result<(), TestCaseError> {
+    let said = diagnosis(resolver, seed)?;
+    let names: Vec<_> = said.findings.iter().map(|f| (&f.effect, &f.form)).collect();
+    let found = |effect: &'static str| said.findings.iter().filter(move |f| f.effect == effect);
+    let is_near = |value: f64, truth: f64| (value / truth - 1.0).abs() < 0.1;
+    let lag = found("servo_lag").map(|f| size(f, "lag"));
+    let late: f64 = lag.chain(found("latency").map(|f| size(f, "delay"))).sum();
+    prop_assert!(is_near(late, resolver.delay), "{late} s of {resolver:?}: {names:?}");
+    let wave = found("cyclic_error").map(|f| size(f, "amplitude").to_degrees()).fold(f64::NAN, f64::max);
+    prop_assert!(is_near(wave, resolver.amplitude), "{wave} deg of {resolver:?}: {names:?}");
+    let lost = ["backlash", "hysteresis", "direction_dependent_pose"];
+    prop_assert!(!names.iter().any(|(effect, _)| lost.contains(&effect.as_str())), "{resolver:?}: {names:?}");
+    Ok(())
+}
+
 proptest! {
     // The same draws each time: now and then a wave is taken for the bend of a scale, as it may be on one turn.
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), ..ProptestConfig::with_cases(10) })]
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::with_cases(8) })]
 
     #[test]
-    fn the_delay_of_a_resolver_is_no_lost_motion_and_its_waves_have_their_order(
+    fn the_delay_of_a_resolver_is_no_lost_motion_and_its_wave_has_its_order(
         order in 2u8..7, amplitude in 1.0..8.0f64, phase in 0.0..TAU,
         scale in -3e-3..3e-3f64, delay in 0.02..0.05f64, seed in any::<u64>(),
     ) {
-        let resolver = Resolver { order, amplitude, phase, scale, delay };
-        let said = diagnosis(resolver, seed)?;
-        let size = |finding: &Finding, name: &str| {
-            finding.coefficients.iter().find(|c| c.name == name).map_or(f64::NAN, |c| c.value)
-        };
-        let found = |names: &[&str]| said.findings.iter().find(|f| names.contains(&f.effect.as_str()));
-        let is_near = |value: f64, truth: f64| (value / truth - 1.0).abs() < 0.1;
-        let late = found(&["servo_lag", "latency"]);
-        let late = late.map_or(f64::NAN, |f| size(f, if f.effect == "latency" { "delay" } else { "lag" }));
-        let wave = found(&["cyclic_error"]).map_or(f64::NAN, |f| size(f, "amplitude"));
-        let names: Vec<_> = said.findings.iter().map(|f| (&f.effect, &f.form)).collect();
-        prop_assert!(is_near(late, delay), "{late} s of {resolver:?}: {names:?}");
-        prop_assert!(is_near(wave, amplitude.to_radians()), "{wave} rad of {resolver:?}: {names:?}");
-        prop_assert!(found(&["backlash", "hysteresis", "direction_dependent_pose"]).is_none(), "{resolver:?}: {names:?}");
+        is_told(Resolver { order, amplitude, phase, scale, delay }, seed)?;
     }
 }

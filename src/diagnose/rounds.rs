@@ -123,14 +123,14 @@ impl Case<'_> {
             if round == NOISE_ROUNDS || is_settled(&judged) {
                 let heat = search.leftover(&search.beside(&active, None)).heat;
                 if heat < HOT {
-                    let found = less_rare(&search, search.unfolded(active));
+                    let found = less_rare(&search, search.unfolded(active, most_wild));
                     let active = search.polished(&folds::useful(&search, &found, most_wild));
                     return Ok(report(&search, &active));
                 }
                 // Much is left, as it always is on real machines: the simplest names that stand out from it count.
                 let search =
                     Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
-                let found = less_rare(&search, search.unfolded(search.run(&active, |_| true)));
+                let found = less_rare(&search, search.unfolded(search.run(&active, |_| true), most_wild));
                 active = search.polished(&folds::useful(&search, &found, most_wild));
                 if moves < MOVES
                     && let Some(late) = late(&search, &active, plain)

@@ -179,6 +179,30 @@ pub(super) fn is_of_position(candidate: &Candidate) -> bool {
         })
 }
 
+/// How many of its waves go into a turn (rad) or a metre of its joint, where it is a wave of where that stands and a whole number of them.
+///
+/// Such a wave comes back with each turn, and no shape of it has fewer a turn, nor what does not come back.
+pub(super) fn order(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Option<f64> {
+    if !is_of_position(candidate) || !candidate.parameters.iter().all(|p| p.whole) {
+        return None;
+    }
+    let position = column(&rows.linear.samples, *candidate.features[0].joints().first()?, |c| &c.position);
+    let (low, high) = (index_of(&position, f64::min)?, index_of(&position, f64::max)?);
+    let of = |feature: &Feature| -> Option<f64> {
+        let phase = feature.wave()?.1.over(&rows.linear.samples, parameters);
+        Some((phase[high] - phase[low]).abs() / (position[high] - position[low]))
+    };
+    let orders: Option<Vec<f64>> = candidate.features.iter().map(of).collect();
+    let order = orders?.into_iter().fold(f64::INFINITY, f64::min);
+    order.is_finite().then_some(order)
+}
+
+/// Where the extreme of a column is.
+fn index_of(x: &[f64], extreme: impl Fn(f64, f64) -> f64) -> Option<usize> {
+    let value = x.iter().copied().reduce(extreme)?;
+    x.iter().position(|x| *x == value)
+}
+
 /// Answers of the readings to each direction of the effect.
 pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
     let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();

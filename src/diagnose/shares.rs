@@ -108,14 +108,20 @@ impl Search<'_> {
         candidate.jumps() && candidate.features.iter().any(Feature::needs_moment)
     }
 
-    /// A joint at which more effects than that are functions of where it stands: each a patch of a curve that has no name.
+    /// A joint at which more effects than that are functions of where it stands: each a patch of a curve that has no name. Waves of
+    /// whole orders count as one.
     pub fn patched(&self, active: &[Active]) -> Option<Place> {
-        let of_position = active
-            .iter()
-            .map(|effect| &self.candidates[effect.candidate])
-            .filter(|c| shape::is_of_position(c));
-        let places: Vec<Place> = of_position.map(|candidate| candidate.place).collect();
-        places.iter().copied().find(|place| places.iter().filter(|other| *other == place).count() > PATCHES)
+        let of_position: Vec<(Place, bool)> = (active.iter())
+            .map(|effect| (&self.candidates[effect.candidate], &effect.score.parameters))
+            .filter(|(candidate, _)| shape::is_of_position(candidate))
+            .map(|(candidate, at)| (candidate.place, shape::order(self.rows, candidate, at).is_some()))
+            .collect();
+        let patches = |place: &Place| {
+            let here = || of_position.iter().filter(|(at, _)| at == place);
+            let others = here().filter(|(_, is_order)| !is_order).count();
+            others + usize::from(here().any(|(_, is_order)| *is_order))
+        };
+        of_position.iter().map(|(place, _)| *place).find(|place| patches(place) > PATCHES)
     }
 
     /// Whether two candidates are forms of one effect at one place.
@@ -147,13 +153,30 @@ impl Search<'_> {
         self.goes_by_clock(rival.candidate) && active.iter().any(is_course)
     }
 
+    /// Whether an effect is a wave of a whole order, which comes back with every turn, and the rival depends on where the same joint stands
+    /// and does not, or has fewer waves a turn: then it is no shape of that wave.
+    fn is_no_shape(&self, rival: &Rival, effect: &Active) -> bool {
+        let order = |candidate: usize, at: &[f64]| shape::order(self.rows, &self.candidates[candidate], at);
+        let place = |candidate: usize| self.candidates[candidate].place;
+        if place(rival.candidate) != place(effect.candidate)
+            || !shape::is_of_position(&self.candidates[rival.candidate])
+        {
+            return false;
+        }
+        let Some(of) = order(effect.candidate, &effect.score.parameters) else { return false };
+        let own = order(rival.candidate, &rival.score.parameters);
+        own.is_none_or(|own| own.round() % of.round() != 0.0)
+    }
+
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place and where
     /// both go by the clock.
     pub fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
         let timed = |candidate: usize| self.goes_by_clock(candidate);
         let share = |effect: &Active| {
-            if place(effect.candidate) == place(rival.candidate) {
+            if self.is_no_shape(rival, effect) {
+                0.0
+            } else if place(effect.candidate) == place(rival.candidate) {
                 OWN_SHAPE
             } else if self.is_tone(rival.candidate) || timed(effect.candidate) && timed(rival.candidate) {
                 CLOCK_SHAPE

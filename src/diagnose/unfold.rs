@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::folds;
-use super::search::{Active, ENTER, NEAR, Search, all_but};
+use super::search::{Active, ENTER, NEAR, Rival, Search, all_but};
 use super::shape;
 use crate::effects::Candidate;
 
@@ -14,7 +14,8 @@ impl Search<'_> {
     /// Effects with every curve along the travel of a joint resolved into other names at that joint, where these say more than it.
     ///
     /// Names come one by one, and no two of them need say as much as a curve of eight orders: only together do they.
-    pub fn unfolded(&self, active: Vec<Active>) -> Vec<Active> {
+    /// `most_wild`: as [`folds::useful`] asks of each.
+    pub fn unfolded(&self, active: Vec<Active>, most_wild: f64) -> Vec<Active> {
         let is_curve = |effect: &Active| {
             let candidate = &self.candidates[effect.candidate];
             shape::is_curve(candidate) && effect.score.coefficients >= CURVE
@@ -22,7 +23,7 @@ impl Search<'_> {
         let mut active = active;
         let mut i = 0;
         while i < active.len() {
-            match is_curve(&active[i]).then(|| self.resolved(&active, i)).flatten() {
+            match is_curve(&active[i]).then(|| self.resolved(&active, i, most_wild)).flatten() {
                 Some(names) => active = names,
                 None => i += 1,
             }
@@ -31,7 +32,7 @@ impl Search<'_> {
     }
 
     /// Effects with others in the place of curve `i`; `None` where they say no more.
-    fn resolved(&self, active: &[Active], i: usize) -> Option<Vec<Active>> {
+    fn resolved(&self, active: &[Active], i: usize, most_wild: f64) -> Option<Vec<Active>> {
         let curve = &active[i];
         let others = all_but(active, Some(i));
         let alone = self.beside_names(&others);
@@ -56,7 +57,17 @@ impl Search<'_> {
             names.push(Active { near, ..entered });
             sum += weight;
             let resolved = [others.as_slice(), &names].concat();
-            if sum > most + ENTER && folds::foretell_better(self, &resolved, active) {
+            let is_useful = || folds::useful(self, &resolved, most_wild).len() == resolved.len();
+            // Beside the shapes of the others each has to stand out by itself.
+            let stands_out = |i: usize| {
+                let own = |r: &Rival| r.candidate == resolved[i].candidate && r.weight > ENTER;
+                self.rivals_of(&resolved, i).iter().any(own)
+            };
+            if sum > most + ENTER
+                && folds::foretell_better(self, &resolved, active)
+                && is_useful()
+                && (0..resolved.len()).all(stands_out)
+            {
                 return Some(resolved);
             }
         }

@@ -235,9 +235,19 @@ impl Identified<'_> {
             coefficient.parts.first()
         });
         match part {
-            Some(part) if part.slot == Slot::Reading || part.direction.v.norm() > 0.0 => Dimension::LENGTH,
+            Some(part) if part.slot == Slot::Reading => self.unit_of_readings(),
+            Some(part) if part.direction.v.norm() > 0.0 => Dimension::LENGTH,
             Some(_) => Dimension::ANGLE,
             None => Dimension::ONE,
+        }
+    }
+
+    /// Of what stands on readings: those of angles have coefficients in rad, or in rad for each s.
+    fn unit_of_readings(&self) -> Dimension {
+        let angles = [Dimension::ANGLE, Dimension::ANGLE.over(Dimension::TIME)];
+        match self.candidate.coefficients.iter().any(|c| angles.contains(&c.dimension)) {
+            true => Dimension::ANGLE,
+            false => Dimension::LENGTH,
         }
     }
 
