@@ -4,6 +4,7 @@ mod common;
 
 use std::f64::consts::TAU;
 
+use common::normals;
 use kincal::diagnose::{Diagnosis, Finding, Request, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
@@ -52,20 +53,6 @@ fn command(t: f64) -> f64 {
     };
     let back = 2.0 * REST + 360.0 / SPEED + RAMP;
     way(t - REST) - way(t - back)
-}
-
-/// Noise of unit variance; the sum of four even numbers is near enough to normal.
-fn normals(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed | 1;
-    move || {
-        let sum: f64 = (0..4)
-            .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            })
-            .sum();
-        3f64.sqrt() * sum
-    }
 }
 
 fn diagnosis(resolver: Resolver, seed: u64) -> Result<Diagnosis, TestCaseError> {

@@ -4,6 +4,7 @@ mod common;
 
 use std::f64::consts::TAU;
 
+use common::normals;
 use kincal::diagnose::{Request, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
@@ -12,20 +13,6 @@ use proptest::test_runner::RngSeed;
 
 /// Periods of which the errors are compared with what is said of them.
 const DRAWS: u32 = 40;
-
-/// Noise of unit variance; the sum of four even numbers is near enough to normal.
-fn normals(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed | 1;
-    move || {
-        let sum: f64 = (0..4)
-            .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            })
-            .sum();
-        3f64.sqrt() * sum
-    }
-}
 
 /// Sixty targets about 10 mm apart, not quite evenly, approached from either side three times: 2 um of a wave and 0.4 um of noise.
 /// The targets are the same in every draw: once in some hundred, chance would lay them so evenly that they hide a wave.

@@ -46,3 +46,17 @@ pub fn shared(path: &str) -> Option<PathBuf> {
     println!("skipped: ../shared/{path} is not here");
     None
 }
+
+/// Noise of unit variance; the sum of four even numbers is near enough to normal.
+pub fn normals(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed | 1;
+    move || {
+        let sum: f64 = (0..4)
+            .map(|_| {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+            })
+            .sum();
+        3f64.sqrt() * sum
+    }
+}
