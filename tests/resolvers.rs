@@ -69,6 +69,10 @@ fn diagnosis(resolver: Resolver, seed: u64) -> Result<Diagnosis, TestCaseError> 
     diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {}).map_err(fail)
 }
 
+fn draws() -> u32 {
+    std::env::var("KINCAL_DRAWS").ok().and_then(|n| n.parse().ok()).unwrap_or(8)
+}
+
 /// Size of a finding's number of this name, SI.
 fn size(finding: &Finding, name: &str) -> f64 {
     finding.coefficients.iter().find(|c| c.name == name).map_or(f64::NAN, |c| c.value)
@@ -91,8 +95,8 @@ fn is_told(resolver: Resolver, seed: u64) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    // The same draws each time: now and then a wave is taken for the bend of a scale, as it may be on one turn.
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::with_cases(8) })]
+    // The same draws each time; more of them where somebody has the time.
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(1), failure_persistence: None, max_shrink_iters: 0, ..ProptestConfig::with_cases(draws()) })]
 
     #[test]
     fn the_delay_of_a_resolver_is_no_lost_motion_and_its_wave_has_its_order(

@@ -22,7 +22,7 @@ use crate::recording::Recording;
 
 /// Rounds of judging the noise from what is left.
 const NOISE_ROUNDS: usize = 3;
-/// So many times the machine is linearised anew, where effects are so large that it has to be.
+/// So many times the machine is linearised anew, or taken as late as was found, where effects are so large that it has to be.
 const MOVES: usize = 3;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;

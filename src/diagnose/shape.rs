@@ -17,6 +17,8 @@ use crate::lie::Twist;
 const PART: f64 = 0.3;
 /// Shapes that are smaller than this part of the noise, all rows together, are left aside.
 const HIDDEN: f64 = 0.2;
+/// A function of position with so many coefficients may bend as it likes.
+pub(super) const BENDS: usize = 3;
 /// Orders of curves along travel and time.
 const CURVE: usize = 12;
 /// Orders of what multiplies the effect's own features.
@@ -159,9 +161,9 @@ pub(super) fn is_of_curve(curve: &Candidate, other: &Candidate) -> bool {
         && motions(other).iter().all(|motion| motions(curve).contains(motion))
 }
 
-/// Whether it is a curve along the travel of a joint, of any form.
+/// Whether it is a curve along the travel of a joint, of so many coefficients.
 pub(super) fn is_curve(candidate: &Candidate) -> bool {
-    candidate.parameters.is_empty() && is_along_travel(candidate) && candidate.coefficients.len() > 2
+    candidate.parameters.is_empty() && is_along_travel(candidate) && candidate.coefficients.len() >= BENDS
 }
 
 /// Whether it depends on where one joint stands and on nothing else, and is no wave.

@@ -1,4 +1,4 @@
-//! A curve in the place of several names: what bends along a whole turn may be a line and the waves of an encoder, `docs/diagnosis.md` (75).
+//! Several names in the place of a curve: what bends along a whole turn may be a line and the waves of an encoder, `docs/diagnosis.md` (75).
 
 use std::sync::Arc;
 
@@ -6,9 +6,6 @@ use super::folds;
 use super::search::{Active, ENTER, NEAR, Rival, Search, all_but};
 use super::shape;
 use crate::effects::Candidate;
-
-/// A curve has at least so many coefficients.
-const CURVE: usize = 3;
 
 impl Search<'_> {
     /// Effects with every curve along the travel of a joint resolved into other names at that joint, where these say more than it.
@@ -18,7 +15,7 @@ impl Search<'_> {
     pub fn unfolded(&self, active: Vec<Active>, most_wild: f64) -> Vec<Active> {
         let is_curve = |effect: &Active| {
             let candidate = &self.candidates[effect.candidate];
-            shape::is_curve(candidate) && effect.score.coefficients >= CURVE
+            shape::is_curve(candidate) && effect.score.coefficients >= shape::BENDS
         };
         let mut active = active;
         let mut i = 0;
