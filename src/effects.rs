@@ -17,6 +17,7 @@ mod library;
 mod place;
 mod quantity;
 mod scan;
+mod soundness;
 mod wave;
 mod window;
 
@@ -24,11 +25,12 @@ pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Skipped
 pub use facts::RecordingFacts;
 pub(crate) use facts::by_setup;
 pub use family::{
-    Clock, Directions, Family, Grid, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat,
-    Size, Which,
+    Clock, Directions, Family, Grid, Less, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range,
+    Seat, Size, Which,
 };
 pub(crate) use grid::NO_TIME;
 pub use identified::{BoundPart, Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
-pub use library::{Library, LibraryFault};
+pub use library::Library;
 pub use place::{Place, Slot};
 pub use quantity::in_words;
+pub use soundness::LibraryFault;

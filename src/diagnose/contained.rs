@@ -1,9 +1,11 @@
 //! Names that say the same as a wider one that adds next to nothing: a scale that is off by 3000 ppm and bends by 10 is a scale error.
+//! And wider names that add nothing to what has another name, `docs/diagnosis.md` (78).
 
 use nalgebra::{DMatrix, DVector};
 
-use super::search::{Rival, Search};
+use super::search::{Active, Rival, Search};
 use super::space::{Space, gram};
+use crate::effects::Candidate;
 
 /// What a wider name adds is next to nothing below this part of what it does, root mean square in m and rad.
 const NOTHING: f64 = 0.03;
@@ -14,6 +16,37 @@ const LIKELIER: f64 = 2.0;
 /// Columns are contained that leave no more of themselves than this part, and the same as others that leave this part of their square.
 const CONTAINED: f64 = 1e-4;
 const SAME: f64 = 1e-10;
+
+/// A name says no more than less does where it takes away no more than this part of half its energy beyond it, and this by chance.
+const MORE: f64 = 0.004;
+const CHANCE: f64 = 4.0;
+
+/// Whether effect `i` is no more than what its name says more than, and no other name for that is at hand: straight lines are no
+/// positioning errors, even where nobody has told of scales.
+pub(super) fn says_no_more(search: &Search, active: &[Active], i: usize) -> bool {
+    let effect = &active[i];
+    let candidate = &search.candidates[effect.candidate];
+    if candidate.more_than.is_empty() {
+        return false;
+    }
+    let field = search.rows.field(search.ground(active, Some(i)).with(&effect.state));
+    let gain = |candidate: &Candidate, parameters: &[f64]| {
+        let score = search.rows.score_at(candidate, parameters, &field, search.heat);
+        score.map_or(0.0, |score| score.gain)
+    };
+    let own = gain(candidate, &effect.score.parameters);
+    let enough = own - MORE * own - CHANCE * search.heat;
+    let is_empty =
+        |candidate: &Candidate, at: &[f64]| candidate.more_than.iter().any(|less| gain(less, at) >= enough);
+    let is_name = |rival: &Rival| {
+        let other = &search.candidates[rival.candidate];
+        other.told_as != candidate.told_as
+            && other.place == candidate.place
+            && gain(other, &rival.score.parameters) >= enough
+            && !is_empty(other, &rival.score.parameters)
+    };
+    is_empty(candidate, &effect.score.parameters) && !search.rivals_of(active, i).iter().any(is_name)
+}
 
 /// Puts simpler names above the best one where that contains them and hardly departs from them. `close`: those that come into question.
 pub(super) fn prefer_simpler(search: &Search, rivals: &mut [Rival], close: usize, space: &Space) {

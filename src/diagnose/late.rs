@@ -41,10 +41,12 @@ pub(super) fn late(search: &Search, active: &[Active], plain: &[Candidate]) -> O
         shape::is_of_position(candidate)
             && candidate.features[0].joints().iter().all(|j| lags.contains_key(j))
     };
-    let delayed = |candidate: &Candidate| {
-        let features = candidate.features.iter();
-        let late = |f| lags.iter().fold(Clone::clone(f), |f: Feature, (j, by)| f.late(*j, *by));
-        Candidate { features: features.map(late).collect(), ..candidate.clone() }
+    let late = |f: &Feature| lags.iter().fold(f.clone(), |f, (j, by)| f.late(*j, *by));
+    let features = |candidate: &Candidate| candidate.features.iter().map(late).collect::<Vec<Feature>>();
+    let less = |candidate: &Candidate| Candidate { features: features(candidate), ..candidate.clone() };
+    let delayed = |candidate: &Candidate| Candidate {
+        more_than: candidate.more_than.iter().map(less).collect(),
+        ..less(candidate)
     };
     let mut change = 0.0;
     for (i, effect) in active.iter().enumerate() {

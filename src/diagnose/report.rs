@@ -3,12 +3,14 @@
 use super::along::along_travel;
 use super::approaches::approaches;
 use super::companions::{self, Companion};
+use super::contained::says_no_more;
 use super::diagnosis::{Diagnosis, Named, by_model, rms_of};
 use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
 use super::held_out::Model;
 use super::noise::Noise;
 use super::odds::{Odds, confusable, odds, trust};
+use super::outbid::outbid;
 use super::outliers;
 use super::placebo::{Placebo, placebo};
 use super::search::{Active, Rival, Search, all_but};
@@ -80,11 +82,13 @@ pub(super) fn report(
             .as_ref()
             .map(|placebo| Meaningless { cause: placebo.cause.clone(), share: placebo.share });
     }
-    let outdone: Vec<usize> = (told.iter().zip(&placebos))
-        .filter_map(|((i, ..), placebo)| placebo.as_ref().filter(|p| p.ahead > OUTDONE).map(|_| *i))
+    let is_outdone = |placebo: &Option<Placebo>| placebo.as_ref().is_some_and(|p| p.ahead > OUTDONE);
+    let empty: Vec<usize> = (told.iter().zip(&placebos))
+        .filter(|((i, ..), placebo)| is_outdone(placebo) || says_no_more(search, active, *i))
+        .map(|((i, ..), _)| *i)
         .collect();
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
-        !outdone.contains(i) && (!search.in_motion || finding.probability > LIKELY)
+        !empty.contains(i) && (!search.in_motion || finding.probability > LIKELY)
     };
     let likely = told.iter().filter(|told| holds(told)).count();
     if likely < told.len() {
@@ -180,6 +184,9 @@ fn doubt(
     if is_unexplained {
         let energy = search.leftover(&search.base).energy.max(left.energy);
         return Some(Doubt { place: patched, energy });
+    }
+    if let Some(series) = outbid(search, active, machine) {
+        return Some(Doubt { place: Some(series.place), energy: 2.0 * series.gain });
     }
     if search.in_motion {
         return None;

@@ -249,6 +249,14 @@ impl Search<'_> {
         self.base.with(&side_by_side(&parts, self.rows.residual.len()))
     }
 
+    /// Logarithm of the evidence of all active effects together, with what they were before and their shapes.
+    pub fn worth(&self, active: &[Active]) -> f64 {
+        let parts: Vec<&DMatrix<f64>> =
+            active.iter().flat_map(|e| [&e.columns, &e.state, &e.shape]).collect();
+        let left = self.base.apply(&self.rows.residual);
+        self.base.worth(&side_by_side(&parts, left.len()), &left, self.heat)
+    }
+
     /// What is left beside the active effects.
     pub fn leftover(&self, space: &Space) -> Leftover {
         let left = space.apply(&self.rows.residual);

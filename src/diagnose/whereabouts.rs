@@ -33,6 +33,8 @@ const DECAYS: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
 const USUAL: (f64, f64) = (3e-6, 3e-5);
 /// What no place foretells by at least this part is the instrument's, or the time's.
 const FORETOLD: f64 = 0.1;
+/// A series comes into question if it takes at least this part of what the best one does, on blocks of samples.
+const IN_QUESTION: f64 = 0.97;
 
 /// A way in which a place can move.
 type Motion = (Slot, Twist<f64>);
@@ -71,13 +73,14 @@ pub(super) fn whereabouts(search: &Search, machine: &Machine) -> Place {
 }
 
 /// The series of most evidence beside a space.
+///
+/// Blocks of samples hide a little of every curve, which may be more than what one place is ahead of another: they say which series come
+/// into question, and all samples which of these it is.
 pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Option<Standing> {
     let (rows, heat) = (search.rows, search.heat);
     let field = rows.field(space);
-    let one = |series: &Series| {
-        let fine = (&*field.space, &field.left);
-        let level = series.level(rows);
-        let (space, left) = level.map_or(fine, |level| {
+    let one = |series: &Series, level: Option<usize>| {
+        let (space, left) = level.map_or((&*field.space, &field.left), |level| {
             let (space, left) = rows.on_level(&field, level);
             (space, left)
         });
@@ -90,8 +93,19 @@ pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Opti
         });
         standing
     };
-    let all: Vec<Standing> = all(search, machine).par_iter().filter_map(one).collect();
-    all.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence))
+    let all = all(search, machine);
+    let coarse = |series: &Series| {
+        let level = series.level(rows);
+        one(series, level).map(|standing| (standing, level.is_some()))
+    };
+    let judged: Vec<Option<(Standing, bool)>> = all.par_iter().map(coarse).collect();
+    let most = judged.iter().flatten().map(|(standing, _)| standing.gain).fold(0.0, f64::max);
+    let fine = |(series, judged): (&Series, &Option<(Standing, bool)>)| {
+        let (standing, on_blocks) = (*judged)?;
+        if on_blocks && standing.gain > IN_QUESTION * most { one(series, None) } else { Some(standing) }
+    };
+    let settled: Vec<Standing> = all.par_iter().zip(&judged).filter_map(fine).collect();
+    settled.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 
 impl Series {
@@ -143,7 +157,7 @@ fn all(search: &Search, machine: &Machine) -> Vec<Series> {
     let mut all: Vec<Series> = courses.iter().flat_map(Course::series).collect();
     for one in &courses {
         for other in courses.iter().filter(|other| other.joint != one.joint) {
-            let (own, others) = (series(&one.along, 1, CROSSED), series(&other.along, 1, CROSSED));
+            let (own, others) = (one.crossing(), other.crossing());
             let curves = own.iter().flat_map(|a| others.iter().map(|b| product(a, b))).collect();
             let (place, motions) = (Place::Joint(one.joint), vec![one.own()]);
             all.push(Series { place, motions, curves, jumps: false });
@@ -183,6 +197,22 @@ impl<'a> Course<'a> {
         (Slot::Before(self.joint), self.twist)
     }
 
+    /// What may depend on another joint as well: slow waves of where it stands, and its sine and cosine, as weights on a rotary joint have them.
+    fn crossing(&self) -> Vec<Vec<f64>> {
+        let mut curves = series(&self.along, 0, CROSSED);
+        if self.kind == JointKind::Revolute {
+            curves.extend(self.turns(1.0));
+        }
+        curves
+    }
+
+    /// Sine and cosine of so many times its angle.
+    fn turns(&self, times: f64) -> [Vec<f64>; 2] {
+        let angles: Vec<f64> = self.column(|c| &c.position).into_iter().map(|q| times * q).collect();
+        let (sines, cosines) = sines_cosines(&angles);
+        [sines, cosines]
+    }
+
     /// What depends on this joint alone: its own motion by position, by side and by rates; what its bearing or guideway does by
     /// position and by side.
     fn series(&self) -> Vec<Series> {
@@ -204,11 +234,7 @@ impl<'a> Course<'a> {
         let rates = rates.iter().filter_map(|rate| over_largest(rate));
         let mut motion = series(&self.along, 1, COARSE);
         if self.kind == JointKind::Revolute {
-            for turns in [1.0, 2.0, 3.0] {
-                let angle = self.column(|c| &c.position).into_iter().map(|q| turns * q);
-                let (sine, cosine) = angle.map(f64::sin_cos).unzip();
-                motion.extend([sine, cosine]);
-            }
+            motion.extend([1.0, 2.0, 3.0].into_iter().flat_map(|times| self.turns(times)));
         }
         let all = [
             (own.clone(), series(&self.along, 1, FINE), false),

@@ -86,6 +86,8 @@ pub struct Candidate {
     pub grid: Vec<Vec<f64>>,
     /// Coefficients of features beyond this many may be left out from the end, by their `order`.
     pub least: usize,
+    /// Itself, were it only what its name says more than, with the same parameters.
+    pub more_than: Vec<Candidate>,
     /// How often it is met, against 1 for backlash.
     pub often: f64,
     /// Coefficients up to this, SI, are usual whatever the deviation that they make.
@@ -322,7 +324,9 @@ fn candidate(
             smooth: !whole(i) && features.iter().all(|f| f.is_smooth_in(i)),
         })
         .collect();
+    let lessened = |less: Family| candidate(index, &less, place, machine, facts);
     Ok(Candidate {
+        more_than: family.lessened().map(lessened).collect::<Result<_, _>>()?,
         family: index,
         effect: family.name.clone(),
         told_as: family.told_as().into(),

@@ -16,6 +16,10 @@ pub struct Family {
     /// travel is a form of `backlash`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub form_of: Option<String>,
+    /// Names of which it is one by a cause of its own: a dent in a guideway is a straightness error. Findings bear its own name, but who
+    /// leaves out one of those leaves it out too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub kind_of: Vec<String>,
     /// Symbol of a standard, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub symbol: Option<String>,
@@ -35,6 +39,9 @@ pub struct Family {
     /// What the deviation depends on.
     #[serde(default)]
     pub features: Vec<Expression>,
+    /// What the name says more than: a positioning error bends, and is no name for a straight line.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub more_than: Vec<Less>,
     /// Where features enter in their order: how many there are at least. All of them, if this is left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub least: Option<usize>,
@@ -90,6 +97,18 @@ impl Family {
         self.form_of.as_ref().unwrap_or(&self.name)
     }
 
+    /// Itself, were it only what its name says more than.
+    pub(super) fn lessened(&self) -> impl Iterator<Item = Family> {
+        self.more_than.iter().map(|less| Family {
+            directions: less.directions.clone(),
+            features: less.features.clone(),
+            least: None,
+            more_than: Vec::new(),
+            coefficients: Vec::new(),
+            ..self.clone()
+        })
+    }
+
     /// The widest play of which the width is stated, m or rad.
     pub(super) fn widest_play(&self) -> Option<f64> {
         let mut widest: Option<f64> = None;
@@ -134,6 +153,16 @@ impl Seat {
             Seat::Frame | Seat::Measurement => None,
         }
     }
+}
+
+/// What a name says more than, in the same place and with the same parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename = "less", deny_unknown_fields)]
+pub struct Less {
+    /// Directions in se(3).
+    pub directions: Vec<Directions>,
+    /// What the deviation depends on.
+    pub features: Vec<Expression>,
 }
 
 /// The other joint of a pair.
