@@ -20,6 +20,8 @@ const SAME: f64 = 1e-10;
 /// A name says no more than less does where it takes away no more than this part of half its energy beyond it, and this by chance.
 const MORE: f64 = 0.004;
 const CHANCE: f64 = 4.0;
+/// Another name is at hand that is no rarer than this, as a logarithm.
+const RARER: f64 = 3.0;
 
 /// Whether effect `i` is no more than what its name says more than, and no other name for that is at hand: straight lines are no
 /// positioning errors, even where nobody has told of scales.
@@ -38,14 +40,19 @@ pub(super) fn says_no_more(search: &Search, active: &[Active], i: usize) -> bool
     let enough = own - MORE * own - CHANCE * search.heat;
     let is_empty =
         |candidate: &Candidate, at: &[f64]| candidate.more_than.iter().any(|less| gain(less, at) >= enough);
+    let rivals = search.rivals_of(active, i);
+    let weight = rivals.iter().find(|r| r.candidate == effect.candidate).map_or(0.0, |r| r.weight);
+    // As much as it takes away less, and no rarer otherwise.
     let is_name = |rival: &Rival| {
         let other = &search.candidates[rival.candidate];
+        let takes = gain(other, &rival.score.parameters);
         other.told_as != candidate.told_as
             && other.place == candidate.place
-            && gain(other, &rival.score.parameters) >= enough
+            && takes >= enough
+            && rival.weight + (own - takes) / search.heat + RARER > weight
             && !is_empty(other, &rival.score.parameters)
     };
-    is_empty(candidate, &effect.score.parameters) && !search.rivals_of(active, i).iter().any(is_name)
+    is_empty(candidate, &effect.score.parameters) && !rivals.iter().any(is_name)
 }
 
 /// Puts simpler names above the best one where that contains them and hardly departs from them. `close`: those that come into question.

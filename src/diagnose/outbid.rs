@@ -16,6 +16,7 @@ pub(super) fn outbid(search: &Search, active: &[Active], machine: &Machine) -> O
     if active.len() < 2 || !search.in_motion {
         return None;
     }
-    let names = search.worth(active);
+    let rare: f64 = active.iter().map(|effect| search.priors[effect.candidate]).sum();
+    let names = search.worth(active) + rare;
     standing(search, machine, search.base.clone()).filter(|series| series.evidence > names + AHEAD)
 }

@@ -83,22 +83,21 @@ pub(super) fn report(
             .map(|placebo| Meaningless { cause: placebo.cause.clone(), share: placebo.share });
     }
     let is_outdone = |placebo: &Option<Placebo>| placebo.as_ref().is_some_and(|p| p.ahead > OUTDONE);
-    let empty: Vec<usize> = (told.iter().zip(&placebos))
+    let place = |i: &usize| search.candidates[active[*i].candidate].place;
+    // What is said at a place beside a name for nothing is the rest of a patchwork.
+    let empty: Vec<Place> = (told.iter().zip(&placebos))
         .filter(|((i, ..), placebo)| is_outdone(placebo) || says_no_more(search, active, *i))
-        .map(|((i, ..), _)| *i)
+        .map(|((i, ..), _)| place(i))
         .collect();
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
-        !empty.contains(i) && (!search.in_motion || finding.probability > LIKELY)
+        !empty.contains(&place(i)) && (!search.in_motion || finding.probability > LIKELY)
     };
     let likely = told.iter().filter(|told| holds(told)).count();
     if likely < told.len() {
         let unlikely = told.iter().filter(|told| !holds(told));
-        doubt = unlikely.max_by(|a, b| active[a.0].score.gain.total_cmp(&active[b.0].score.gain)).map(
-            |(i, ..)| Doubt {
-                place: Some(search.candidates[active[*i].candidate].place),
-                energy: 2.0 * active[*i].score.gain,
-            },
-        );
+        doubt = unlikely
+            .max_by(|a, b| active[a.0].score.gain.total_cmp(&active[b.0].score.gain))
+            .map(|(i, ..)| Doubt { place: Some(place(i)), energy: 2.0 * active[*i].score.gain });
         // Of a patchwork no piece is a name.
         let patchwork = told.len() - likely > likely;
         let both = told.into_iter().zip(placebos).filter(|(told, _)| !patchwork && holds(told));

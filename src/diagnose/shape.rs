@@ -26,7 +26,7 @@ const WANDER: usize = 3;
 /// Travel over which something decays after a reversal, as parts of the range of travel.
 const DECAYS: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 /// The same for what is remembered of the time before a recording.
-const EARLY: [f64; 3] = [0.003, 0.01, 0.03];
+pub(super) const EARLY: [f64; 3] = [0.003, 0.01, 0.03];
 /// Effects with more directions keep the mixture of them that was found.
 pub(super) const MOST_DIRECTIONS: usize = 3;
 
@@ -236,7 +236,7 @@ pub(super) fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Ve
 }
 
 /// Distance since a reversal that nobody has seen, m or rad.
-const UNKNOWN: f64 = 1e5;
+pub(super) const UNKNOWN: f64 = 1e5;
 
 /// Other functions of what the effect's features depend on, at every sample.
 fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64>> {

@@ -13,6 +13,7 @@ use super::curves::{column, product};
 use super::evidence::{Worth, evidence};
 use super::score::{Column, Rows, judge};
 use super::search::Search;
+use super::shape::{EARLY, UNKNOWN};
 use super::space::Space;
 use crate::effects::{Place, Slot};
 use crate::elementary::sines_cosines;
@@ -25,10 +26,11 @@ const FINE: usize = 40;
 const COARSE: usize = 6;
 /// The same where it depends on another joint as well.
 const CROSSED: usize = 4;
-/// Orders over time.
-const COURSE: usize = 12;
-/// Travel after a reversal over which something decays, as parts of the range.
-const DECAYS: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
+/// Orders of what is smooth, along a joint's travel or over time.
+const SMOOTH: usize = 12;
+/// What begins at a reversal: the shortest way as part of the range, and how many ways there are, each twice the one before.
+const SHORTEST: f64 = 0.0005;
+const WAYS: usize = 11;
 /// Usual sizes of errors, m and rad.
 const USUAL: (f64, f64) = (3e-6, 3e-5);
 /// What no place foretells by at least this part is the instrument's, or the time's.
@@ -213,7 +215,56 @@ impl<'a> Course<'a> {
         [sines, cosines]
     }
 
-    /// What depends on this joint alone: its own motion by position, by side and by rates; what its bearing or guideway does by
+    /// Any function of the way since the last reversal: hats along its logarithm.
+    fn since_reversal(&self) -> Vec<Vec<f64>> {
+        let steps: Vec<f64> = (self.column(|c| &c.since_reversal).iter())
+            .map(|since| (since / (SHORTEST * self.range)).max(1.0).log2())
+            .collect();
+        let hat = |k: usize| steps.iter().map(|s| (1.0 - (s - k as f64).abs()).max(0.0)).collect();
+        (0..WAYS).map(hat).collect()
+    }
+
+    /// How far it is from the middle of a play of this width (part of the range), -1 to 1: any lost motion that does not know the time is a
+    /// sum of such.
+    fn play(&self, width: f64) -> Vec<f64> {
+        let half = 0.5 * width;
+        let mut curve = Vec::with_capacity(self.along.len());
+        for recording in self.samples {
+            let own = &self.along[curve.len()..curve.len() + recording.len];
+            let side =
+                recording.joints[self.joint].as_ref().and_then(|c| c.direction.first()).unwrap_or(&0.0);
+            let mut middle = own.first().unwrap_or(&0.0) - side * half;
+            for x in own {
+                middle = middle.clamp(x - half, x + half);
+                curve.push((x - middle) / half);
+            }
+        }
+        curve
+    }
+
+    /// What is left, until the joint first turns round in a recording, of what was there before.
+    fn before(&self) -> Vec<Vec<f64>> {
+        let mut curves = Vec::new();
+        for (at, recording) in self.samples.iter().enumerate() {
+            let Some(columns) = &recording.joints[self.joint] else { continue };
+            if columns.since_reversal.first().is_none_or(|since| *since < UNKNOWN) {
+                continue;
+            }
+            let own = columns.since_reversal.iter().zip(&columns.travelled);
+            for part in EARLY {
+                let left = own.clone().map(|(since, way)| match *since < UNKNOWN {
+                    true => 0.0,
+                    false => (-way / (part * self.range)).exp(),
+                });
+                let zeros = |of: &[Samples]| vec![0.0; of.iter().map(|s| s.len).sum()];
+                let (before, after) = (zeros(&self.samples[..at]), zeros(&self.samples[at + 1..]));
+                curves.push(before.into_iter().chain(left).chain(after).collect());
+            }
+        }
+        curves
+    }
+
+    /// What depends on this joint alone: its own motion by position, by side, since reversals and by rates; what its bearing or guideway does by
     /// position and by side.
     fn series(&self) -> Vec<Series> {
         let slot = match self.kind {
@@ -223,13 +274,11 @@ impl<'a> Course<'a> {
         let unit = |k: usize| Twist::from_array(std::array::from_fn(|i| f64::from(u8::from(i == k))));
         let (own, six) = (vec![self.own()], (0..6).map(|k| (slot, unit(k))).collect::<Vec<Motion>>());
         let direction = self.column(|c| &c.direction);
-        let since = self.column(|c| &c.since_reversal);
         let mut sides: Vec<Vec<f64>> =
             series(&self.along, 0, COARSE).iter().map(|curve| product(curve, &direction)).collect();
-        sides.extend(DECAYS.map(|part| {
-            let decay = since.iter().map(|s| (-s / (part * self.range)).max(-200.0).exp());
-            decay.zip(&direction).map(|(decay, d)| decay * d).collect()
-        }));
+        sides.extend(self.since_reversal().iter().map(|curve| product(curve, &direction)));
+        sides.extend((0..WAYS).map(|k| self.play(SHORTEST * 2f64.powi(k as i32))));
+        sides.extend(self.before());
         let rates = [self.column(|c| &c.velocity), self.column(|c| &c.acceleration)];
         let rates = rates.iter().filter_map(|rate| over_largest(rate));
         let mut motion = series(&self.along, 1, COARSE);
@@ -238,6 +287,7 @@ impl<'a> Course<'a> {
         }
         let all = [
             (own.clone(), series(&self.along, 1, FINE), false),
+            (own.clone(), smooth(&self.along), false),
             (own.clone(), sides, true),
             (own, rates.flat_map(|r| [product(&r, &r), r]).collect(), true),
             (six.clone(), motion, false),
@@ -257,8 +307,7 @@ fn over_time(search: &Search) -> Vec<Series> {
     let is_still = |place: Place| matches!(place, Place::Frame(_) | Place::Measurement);
     for candidate in search.candidates.iter().filter(|c| is_still(c.place)) {
         let at = all.iter().position(|series| series.place == candidate.place).unwrap_or_else(|| {
-            let orders = if candidate.place == Place::Measurement { FINE } else { COURSE };
-            let curves = series(&clock, 1, orders);
+            let curves = smooth(&clock);
             all.push(Series { place: candidate.place, motions: Vec::new(), curves, jumps: false });
             all.len() - 1
         });
@@ -269,6 +318,12 @@ fn over_time(search: &Search) -> Vec<Series> {
             }
         }
     }
+    let swift = all.iter().find(|series| series.place == Place::Measurement).map(|readings| Series {
+        motions: readings.motions.clone(),
+        curves: series(&clock, 1, FINE),
+        ..*readings
+    });
+    all.extend(swift);
     all
 }
 
@@ -276,6 +331,12 @@ fn over_time(search: &Search) -> Vec<Series> {
 fn series(x: &[f64], from: usize, to: usize) -> Vec<Vec<f64>> {
     let angles = |n: usize| x.iter().map(|x| n as f64 * PI * x).collect::<Vec<f64>>();
     (from..=to).map(|n| sines_cosines(&angles(n)).1).collect()
+}
+
+/// Chebyshev polynomials of what runs from 0 to 1: what is smooth needs few of them, and says something at the ends too.
+fn smooth(x: &[f64]) -> Vec<Vec<f64>> {
+    let angles: Vec<f64> = x.iter().map(|x| (2.0 * x - 1.0).clamp(-1.0, 1.0).acos() / PI).collect();
+    series(&angles, 1, SMOOTH)
 }
 
 /// From 0 to 1 over what there is, and how much that is; `None` where it stands still.
