@@ -15,6 +15,7 @@
 //! A row is a *drop-out*, left out and counted, where a command, the time, a direction or a measured number is empty or NaN.
 //! A *pause* is a time between two samples longer than five times the median one; derivatives start again after it.
 
+mod call;
 mod column;
 mod entry;
 mod fault;
@@ -26,6 +27,7 @@ mod step;
 mod summary;
 mod text;
 
+pub use call::open_all;
 pub use column::{Channel, Column, Role};
 pub use fault::RecordingFault;
 pub use header::{Header, Measurement, NominalLength, Sigma, ToolPoint};

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use kincal::recording::join;
+use kincal::Machine;
+use kincal::recording::{join, open_all};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/bad/joins")
@@ -66,4 +67,52 @@ fn what_cannot_be_joined_has_a_message_and_a_mend() {
     let error = join(&twice, &good, "left").expect_err("a name that is there");
     told += &format!("{} | {}\n", error.to_string().rsplit('/').next().unwrap_or(""), error.mend());
     insta::assert_snapshot!(told);
+}
+
+/// A post that leans, with an arm on either side that has recordings of its own.
+const POST: &str = r#"Machine(
+    name: "post", units: (length: mm, angle: deg),
+    workpiece: [(frame: "w")],
+    tool: [
+        (frame: "turn", joint: Revolute(axis: "z")),
+        (frame: "arm", at: (200, 0, 300), joint: Revolute(axis: "y")),
+        (frame: "t", at: (500, 0, 0)),
+    ],
+    side_branches: [
+        (on: "turn", recorded_as: "post_left", dyads: [(frame: "left.arm", joint: Revolute(axis: "y"))]),
+        (on: "turn", recorded_as: "post_back", dyads: [(frame: "back.arm", joint: Revolute(axis: "y"))]),
+    ],
+)"#;
+
+#[test]
+fn recordings_of_what_hangs_on_the_machine_are_laid_beside_its_own() {
+    let machine = Machine::parse("post.ron", POST).unwrap_or_else(|e| panic!("{e}"));
+    let of = |name: &str, rows: &str| {
+        let text = format!(
+            "# machine: {name}\n# measurement: position\nturn[deg],arm[deg],px[mm],py[mm],pz[mm]\n{rows}"
+        );
+        file(&format!("{name}.csv"), &text)
+    };
+    let own = of("post", "0,10,1,2,3\n10,20,1,2,3\n30,20,1,2,3\n");
+    let left = of("post_left", "0,-5,4,5,6\n10,-6,4,5,6\n30,-7,4,5,6\n");
+    let back = of("post_back", "0,-8,7,8,9\n10,-9,7,8,9\n30,-9,7,8,9\n");
+    let recordings = open_all(&[left.clone(), own.clone(), back], &machine).unwrap_or_else(|e| panic!("{e}"));
+    let [joined] = &recordings[..] else { panic!("{} recordings", recordings.len()) };
+    let rows = joined.scan().expect("rows").samples;
+    assert_eq!((joined.name(), rows), ("post.csv", 3));
+    let channels: Vec<&str> = joined.columns().iter().map(|c| c.name.as_str()).collect();
+    for column in ["left.arm", "left.px", "back.arm"] {
+        assert!(channels.contains(&column), "{channels:?}");
+    }
+    assert_eq!(joined.warnings().len(), 2);
+    assert!(
+        joined.warnings()[0]
+            .contains("post_left.csv are laid beside it, row by row: both have the same turn")
+    );
+    // Of other moments it belongs to none of them, and alone it is of another machine.
+    let short = of("post_left", "0,-5,4,5,6\n10,-6,4,5,6\n");
+    let error = open_all(&[own, short.clone()], &machine).expect_err("other moments");
+    assert!(error.to_string().contains("rows"), "{error}");
+    let error = open_all(&[short], &machine).expect_err("another machine");
+    assert!(error.to_string().contains("post_left"), "{error}");
 }

@@ -6,14 +6,13 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use kincal::identify::{Figures, Fit, Loss, Model, Options, Rms, Solver, calibrate_model};
 use kincal::machine::JointKind;
-use kincal::recording::Recording;
 use kincal::units::{Quantity, Unit, amount};
 use kincal::variation::{Directions, MOST_AXES, Varying};
 use kincal::{CalibratedMachine, Machine};
 
 use super::Common;
 use super::output::{
-    Failure, Kind, Outcome, angle, check_outputs, count, length, open_machine, open_recording, table,
+    Failure, Kind, Outcome, angle, check_outputs, count, length, open_machine, open_recordings, table,
     write_whole,
 };
 
@@ -166,8 +165,7 @@ impl Args {
 pub(crate) fn run(args: &Args) -> Outcome {
     check_outputs(&[args.output.as_deref(), args.common.json_file()], &args.recordings)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let recordings: Vec<Recording> =
-        args.recordings.iter().map(|path| open_recording(path, &machine)).collect::<Result<_, _>>()?;
+    let recordings = open_recordings(&args.recordings, &machine)?;
     let progress = args.common.progress();
     let found = calibrate_model(&machine, &recordings, &args.model(&machine)?, args.options(), &|text| {
         progress.say(text)

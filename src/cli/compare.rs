@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use kincal::recording::Recording;
 use kincal::rivals::{Arena, Rival, Tuning, Verdict, split};
 use kincal::{CalibratedMachine, Machine};
 use serde::Serialize;
@@ -10,7 +9,7 @@ use serde::Serialize;
 use super::Common;
 use super::calibrate::{positive, relative};
 use super::output::{
-    Failure, Outcome, angle, check_outputs, count, length, open_machine, open_recording, table,
+    Failure, Outcome, angle, check_outputs, count, length, open_machine, open_recordings, table,
 };
 
 #[derive(clap::Args)]
@@ -66,9 +65,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let tuning = Tuning { tau: args.tau, cut: args.cut, steps: args.steps as usize };
     let rivals = chosen(&args.rivals, tuning)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let open = |paths: &[PathBuf]| -> Outcome<Vec<Recording>> {
-        paths.iter().map(|path| open_recording(path, &machine)).collect()
-    };
+    let open = |paths: &[PathBuf]| open_recordings(paths, &machine);
     let (mut fit_on, mut judge_on) = (open(&args.recordings)?, open(&args.judge)?);
     let truth = match &args.truth {
         None => None,

@@ -8,13 +8,12 @@ use kincal::describe::{Description, DyadDescription, describe};
 use kincal::identify::reach;
 use kincal::lie::{Twist, Vec3};
 use kincal::machine::JointKind;
-use kincal::recording::Recording;
 use serde_json::{Value, json};
 
 use super::Common;
 use super::output::{
     Failure, Kind, Outcome, Shown, angle, check_outputs, count, decimals, length, open_machine,
-    open_recording, table,
+    open_recordings, table,
 };
 
 #[derive(clap::Args)]
@@ -44,8 +43,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     if !args.recordings.is_empty() {
         let machine = calibrated.machine();
-        let recordings: Vec<Recording> =
-            (args.recordings.iter()).map(|path| open_recording(path, machine)).collect::<Result<_, _>>()?;
+        let recordings = open_recordings(&args.recordings, machine)?;
         let reach = reach(machine, &recordings)?;
         let _ = writeln!(
             text,

@@ -10,10 +10,9 @@ use std::path::{Path, PathBuf};
 use kincal::Machine;
 use kincal::diagnose::{Diagnosis, Request, diagnose};
 use kincal::effects::Library;
-use kincal::recording::Recording;
 
 use super::Common;
-use super::output::{Outcome, check_outputs, open_machine, open_recording, write_whole};
+use super::output::{Outcome, check_outputs, open_machine, open_recordings, write_whole};
 pub(crate) use text::render;
 
 #[derive(clap::Args)]
@@ -46,8 +45,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         &args.recordings,
     )?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let recordings: Vec<Recording> =
-        args.recordings.iter().map(|path| open_recording(path, &machine)).collect::<Result<_, _>>()?;
+    let recordings = open_recordings(&args.recordings, &machine)?;
     let mut library = Library::standard();
     for path in &args.effects {
         library = library.with_file(path)?;
@@ -76,6 +74,11 @@ pub(crate) fn run(args: &Args) -> Outcome {
     drop(progress);
     let (diagnosis, model) = found?;
     let mut text = render(&diagnosis);
+    for recording in &recordings {
+        for warning in recording.warnings() {
+            let _ = writeln!(text, "note: {}: {warning}", recording.name());
+        }
+    }
     if let (Some(path), Some(model)) = (&args.output, model) {
         write_whole(path, |out| {
             // Watched: an error here is told of the output.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use kincal::recording::Recording;
+use kincal::recording::{Recording, open_all};
 use kincal::{Error, Machine, Place};
 
 use super::Common;
@@ -81,11 +81,11 @@ pub(crate) fn open_machine<T>(path: &Path, open: impl FnOnce(&Path) -> kincal::R
     })
 }
 
-/// Opens a recording; a machine file in its place is told as such.
-pub(crate) fn open_recording(path: &Path, machine: &Machine) -> Outcome<Recording> {
-    Recording::open(path, machine).map_err(|error| match looks_like(path) {
-        Some(Looks::Machine) => misplaced(path, "machine file", "recording"),
-        _ => error.into(),
+/// Opens the recordings of a call; a machine file among them is told as such.
+pub(crate) fn open_recordings(paths: &[PathBuf], machine: &Machine) -> Outcome<Vec<Recording>> {
+    open_all(paths, machine).map_err(|error| {
+        let at_fault = paths.iter().find(|path| looks_like(path) == Some(Looks::Machine));
+        at_fault.map_or_else(|| error.into(), |path| misplaced(path, "machine file", "recording"))
     })
 }
 

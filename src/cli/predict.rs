@@ -7,7 +7,9 @@ use kincal::identify::{Loss, fit_setup};
 use kincal::predict::{Prediction, predict};
 
 use super::Common;
-use super::output::{Kind, Outcome, check_outputs, count, open_machine, open_recording, write_whole};
+use super::output::{
+    Failure, Kind, Outcome, check_outputs, count, open_machine, open_recordings, write_whole,
+};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -17,6 +19,9 @@ pub(crate) struct Args {
     /// Recording
     #[arg(value_name = "REC.csv")]
     recording: PathBuf,
+    /// Recordings of the same moments of what hangs on the machine, such as its other arm
+    #[arg(value_name = "BESIDE.csv")]
+    beside: Vec<PathBuf>,
     /// Where to write the recording with model and residual columns
     #[arg(short, long, value_name = "OUT.csv")]
     output: Option<PathBuf>,
@@ -28,9 +33,21 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.output.as_deref(), args.common.json_file()], std::slice::from_ref(&args.recording))?;
+    let files: Vec<PathBuf> = std::iter::once(&args.recording).chain(&args.beside).cloned().collect();
+    check_outputs(&[args.output.as_deref(), args.common.json_file()], &files)?;
     let mut calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
-    let recordings = [open_recording(&args.recording, calibrated.machine())?];
+    let recordings = open_recordings(&files, calibrated.machine())?;
+    if recordings.len() > 1 {
+        return Err(Failure::Told {
+            what: format!(
+                "{} recordings of this machine were given, and one is predicted at a time",
+                recordings.len()
+            ),
+            mend:
+                "predict each by itself; only recordings of what hangs on the machine go beside another one"
+                    .into(),
+        });
+    }
     let progress = args.common.progress();
     if args.fit_setup {
         progress.say("finding the set-up");

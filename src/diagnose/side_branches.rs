@@ -11,12 +11,16 @@ pub struct UnseenSideBranch {
     pub on: String,
     /// Columns that would say how it stands.
     pub columns: Vec<String>,
+    /// Name of the machine as which it is recorded, where the machine file says so: a call may name those recordings too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recorded_as: Option<String>,
 }
 
 /// Side branches that the machine has and that the machine as it was seen has not.
 pub(super) fn unseen(machine: &Machine, seen: &Machine) -> Vec<UnseenSideBranch> {
     let hidden = machine.side_branches().iter().filter(|side| !seen.side_branches().contains(side));
     let one = |side: &SideBranch| UnseenSideBranch {
+        recorded_as: side.recorded_as.clone(),
         on: side.on.clone(),
         columns: side.columns().map(|(name, unit)| format!("{name}[{unit}]")).collect(),
     };

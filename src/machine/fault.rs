@@ -142,6 +142,12 @@ pub enum MachineFault {
         /// What is wrong.
         what: String,
     },
+    /// A side branch with recordings of its own, of which no column could be named.
+    #[error("{what}")]
+    UnnamedSideBranch {
+        /// What is wrong.
+        what: String,
+    },
     /// A machine without any joint.
     #[error("no dyad has a joint")]
     NoJoint,
@@ -214,6 +220,7 @@ impl MachineFault {
             TwoPlacements { .. } => "keep one of the two ways of saying where the frame is".into(),
             NcWord { .. } => "write address: letters and digits such as \"B\" or \"C1\", sign: 1 or -1".into(),
             NoJoint => "a machine needs a joint: (frame: \"x\", joint: Prismatic(axis: \"x\"))".into(),
+            UnnamedSideBranch { .. } => "call them NAME.q1, NAME.q2 and so on: column q1 of its recordings becomes NAME.q1".into(),
             BadSideBranch { .. } => "leave it out: a side branch weighs, its joints are columns of recordings, and nothing of it is identified".into(),
             UnknownFrame { known, .. } => format!("frames of this machine: {known}"),
             BadPieces { .. } => "write the pieces as `calibrate --directions` does".into(),

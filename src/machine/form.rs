@@ -67,6 +67,8 @@ pub(crate) struct ToleranceForm {
 #[serde(rename = "side_branch", deny_unknown_fields)]
 pub(crate) struct SideBranchForm {
     pub on: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recorded_as: Option<String>,
     pub dyads: Vec<DyadForm>,
 }
 

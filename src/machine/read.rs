@@ -66,7 +66,8 @@ impl Machine {
         let side = |(b, form): (usize, &SideBranchForm)| -> Checked<SideBranch> {
             let path = |i| format!("side_branches[{b}].dyads[{i}]");
             let dyads = form.dyads.iter().enumerate().map(|(i, f)| dyad(f, units, &path(i)));
-            Ok(SideBranch { on: form.on.clone(), dyads: dyads.collect::<Checked<_>>()? })
+            let (on, recorded_as) = (form.on.clone(), form.recorded_as.clone());
+            Ok(SideBranch { on, recorded_as, dyads: dyads.collect::<Checked<_>>()? })
         };
         machine.with_side_branches(form.side_branches.iter().enumerate().map(side).collect::<Checked<_>>()?)
     }

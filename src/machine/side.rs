@@ -11,11 +11,21 @@ use super::{Dyad, Joint, JointKind, Machine, MachineFault};
 pub struct SideBranch {
     /// Frame of the machine that carries it, behind that frame's joint.
     pub on: String,
+    /// Name of the machine as which its own recordings are made: their rows are of the same moments, and their columns say where it stands.
+    /// Its joints then bear a common name before a point.
+    pub recorded_as: Option<String>,
     /// From there outwards.
     pub dyads: Vec<Dyad>,
 }
 
 impl SideBranch {
+    /// What all its joints' names have before a point: `right` of right.q1 and right.q2.
+    pub fn prefix(&self) -> Option<&str> {
+        let mut names = self.columns().map(|(name, _)| name.split_once('.').map(|(prefix, _)| prefix));
+        let first = names.next()??;
+        names.all(|name| name == Some(first)).then_some(first)
+    }
+
     /// Names and units (`m`, `rad`) of the columns that say how it stands.
     pub fn columns(&self) -> impl Iterator<Item = (&str, &'static str)> {
         self.dyads.iter().filter_map(|dyad| dyad.joint.as_ref()).map(|joint| {
@@ -48,6 +58,10 @@ impl Machine {
                 let known = self.dyads.iter().map(|d| d.frame.as_str()).collect::<Vec<_>>().join(", ");
                 let fault = MachineFault::UnknownFrame { frame: branch.on.clone(), known };
                 return Err((format!("{path}.on"), fault));
+            }
+            if branch.recorded_as.is_some() && branch.prefix().is_none() {
+                let what = "a side branch states as what it is recorded, but its joints have no common name before a point".into();
+                return Err((format!("{path}.recorded_as"), MachineFault::UnnamedSideBranch { what }));
             }
             for (i, dyad) in branch.dyads.iter().enumerate() {
                 self.check_side(dyad, &format!("{path}.dyads[{i}]"), &mut names)?;

@@ -31,7 +31,11 @@ impl Machine {
             workpiece: forms(workpiece),
             tool: forms(tool),
             side_branches: (self.side_branches.iter())
-                .map(|side| SideBranchForm { on: side.on.clone(), dyads: forms(&side.dyads) })
+                .map(|side| SideBranchForm {
+                    on: side.on.clone(),
+                    recorded_as: side.recorded_as.clone(),
+                    dyads: forms(&side.dyads),
+                })
                 .collect(),
             calibration: None,
         }

@@ -40,9 +40,17 @@ pub fn join(own: &Path, other: &Path, name: &str) -> Result<Joined> {
         let fault = Fault::JoinName { name: text::shown(name.as_bytes()) };
         return Err(error(other, Fail::at(0, 0, fault)));
     }
-    let (own_text, other_text) = (whole(own)?, whole(other)?);
-    let first = Table::read(&own_text).map_err(|fail| error(own, fail))?;
-    let second = Table::read(&other_text).map_err(|fail| error(other, fail))?;
+    beside((own, &whole(own)?), (other, &whole(other)?), name)
+}
+
+/// The same of texts that have been read; paths are for messages.
+pub(super) fn beside(
+    (own, own_text): (&Path, &str),
+    (other, other_text): (&Path, &str),
+    name: &str,
+) -> Result<Joined> {
+    let first = Table::read(own_text).map_err(|fail| error(own, fail))?;
+    let second = Table::read(other_text).map_err(|fail| error(other, fail))?;
     if first.rows.len() != second.rows.len() {
         let (rows, other_rows) = (second.rows.len() as u64, first.rows.len() as u64);
         let fault = Fault::JoinRows { rows, other: own.display().to_string(), other_rows };
@@ -85,7 +93,8 @@ pub fn join(own: &Path, other: &Path, name: &str) -> Result<Joined> {
     Ok(Joined { text: out, rows: first.rows.len() as u64, shared, added })
 }
 
-fn whole(path: &Path) -> Result<String> {
+/// All of a file.
+pub(super) fn whole(path: &Path) -> Result<String> {
     let mut bytes = Vec::new();
     let mut source = Source::File.read_from(path, 0)?;
     source.read_to_end(&mut bytes).map_err(|e| Error::file(path, e))?;

@@ -78,9 +78,13 @@ pub(crate) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
             "{at} stands still all through {recording}, where the readings say that it came there {side}{hint}"
         )
     };
-    let unseen = |UnseenSideBranch { on, columns }: &UnseenSideBranch| {
+    let unseen = |UnseenSideBranch { on, columns, recorded_as }: &UnseenSideBranch| {
+        let mend = match recorded_as {
+            Some(machine) => format!("name a recording of {machine} of the same moments in this call too"),
+            None => "`kincal join` puts recordings of the same moments beside each other".into(),
+        };
         format!(
-            "what hangs on {on} beside the chain is left out, since a recording has no column for each of its joints: {}; `kincal join` puts recordings of the same moments beside each other",
+            "what hangs on {on} beside the chain is left out, since a recording has no column for each of its joints: {}; {mend}",
             columns.join(", ")
         )
     };

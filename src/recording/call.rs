@@ -1,0 +1,79 @@
+//! The recordings of one call: where what hangs on the machine was recorded too, its columns belong beside the machine's own rows.
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use super::join::{beside, whole};
+use super::{Recording, Source};
+use crate::error::Result;
+use crate::machine::{Machine, SideBranch};
+
+/// No more than so much of a file is looked at for the name of its machine.
+const HEADER: u64 = 1 << 16;
+
+/// Opens the recordings of one call.
+///
+/// A recording of the machine that a side branch is [recorded as](SideBranch::recorded_as) is none of this machine: it is laid beside those of
+/// the call that have as many rows and share a column that changes, as [`join`](super::join()) does, and each of these says so in
+/// [`Recording::warnings`]. What fits none of them is an error.
+///
+/// # Errors
+/// As [`Recording::open`] and [`join`](super::join()).
+pub fn open_all(paths: &[PathBuf], machine: &Machine) -> Result<Vec<Recording>> {
+    let side = |path: &PathBuf| -> Option<&SideBranch> {
+        let name = machine_of(path).filter(|name| name != machine.name())?;
+        machine.side_branches().iter().find(|side| side.recorded_as.as_ref() == Some(&name))
+    };
+    let (of_sides, own): (Vec<_>, Vec<_>) =
+        paths.iter().map(|path| (path, side(path))).partition(|(_, side)| side.is_some());
+    let mut recordings =
+        own.iter().map(|(path, _)| Recording::open(path, machine)).collect::<Result<Vec<_>>>()?;
+    for (other, side) in of_sides {
+        let Some(name) = side.and_then(SideBranch::prefix) else { continue };
+        let text = whole(other)?;
+        let (mut fits, mut refused) = (false, None);
+        for recording in &mut recordings {
+            match recording.with_beside((other, &text), name) {
+                Ok(joined) => (*recording, fits) = (joined, true),
+                Err(error) => refused = refused.or(Some(error)),
+            }
+        }
+        match refused.filter(|_| !fits) {
+            Some(error) => return Err(error),
+            // Alone it is of the wrong machine.
+            None if !fits => drop(Recording::open(other, machine)?),
+            None => {}
+        }
+    }
+    Ok(recordings)
+}
+
+impl Recording {
+    /// The same recording with another one's columns behind its own, as `NAME.column`.
+    fn with_beside(&self, (other, text): (&Path, &str), name: &str) -> Result<Recording> {
+        let own = match &self.source {
+            Source::File => whole(&self.path)?,
+            Source::Bytes(bytes) => String::from_utf8_lossy(bytes).into_owned(),
+        };
+        let joined = beside((&self.path, &own), (other, text), name)?;
+        let bytes = Source::Bytes(joined.text.into_bytes().into());
+        let mut recording = Recording::read(self.path.clone(), bytes, &self.machine)?;
+        recording.warnings.clone_from(&self.warnings);
+        recording.warnings.push(format!(
+            "{} columns of {} are laid beside it, row by row: both have the same {}",
+            joined.added.len(),
+            other.display(),
+            joined.shared.join(", ")
+        ));
+        Ok(recording)
+    }
+}
+
+/// The name of the machine that a file says it is of.
+fn machine_of(path: &Path) -> Option<String> {
+    let start = BufReader::new(Source::File.read_from(path, 0).ok()?.take(HEADER));
+    start.lines().map_while(std::result::Result::ok).find_map(|line| {
+        let (key, value) = line.trim_start_matches('\u{feff}').trim().strip_prefix('#')?.split_once(':')?;
+        (key.trim() == "machine").then(|| value.trim().to_string())
+    })
+}
