@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 const STANDARD: &str = include_str!("library.ron");
 /// Where the form of a library is taught.
 const GUIDE: &str = "docs/effects.md shows the form of a library of effects";
+
 #[derive(Deserialize)]
 #[serde(rename = "Effects", deny_unknown_fields)]
 struct LibraryForm {
