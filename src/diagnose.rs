@@ -24,6 +24,7 @@ mod model;
 mod noise;
 mod not_tried;
 mod odds;
+mod orders;
 mod outbid;
 mod outliers;
 mod panel;

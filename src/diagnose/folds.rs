@@ -28,8 +28,9 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
         Some(HeldOutRms { geometric: rms(&geometric)?, r#final: rms(&last)? })
     };
     (diagnosis.held_out_rms_m, diagnosis.held_out_rms_rad) = (both(false), both(true));
+    let is_of = |a: usize, b: usize| a == b || search.is_one(told[a].candidate, told[b].candidate);
     for (i, finding) in diagnosis.findings.iter_mut().enumerate() {
-        let before = with(&|effect| effect != i);
+        let before = with(&|effect| !is_of(effect, i));
         let pair = |angle: bool| {
             let rms = |left: &[f64]| rms_of(search, left, angle);
             Some(HeldOutPair { before: rms(&before)?, after: rms(&last)? })

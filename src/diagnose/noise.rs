@@ -50,6 +50,8 @@ impl Noise {
 
 /// Beyond so many standard deviations of its surroundings a reading is an outlier.
 const OUTLIER: f64 = 5.0;
+/// The same of what was none before effects were found.
+const FAR: f64 = 8.0;
 /// So many readings on either side tell how rough it is around one.
 const AROUND: usize = 15;
 /// No instrument resolves less, m or rad.
@@ -92,6 +94,18 @@ fn is_pause(span: &Span, last: Option<f64>, now: Option<f64>) -> bool {
 /// Rows that lie far off their neighbours: by the median of the two on either side.
 /// `smooth`: along a continuous path one scale holds for all; settled positions are compared with those around them.
 pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> Vec<bool> {
+    beyond(OUTLIER, residual, runs, smooth)
+}
+
+/// The same of settled positions where effects were found, `residual` beside them: what was no outlier among all that they did has to be
+/// farther off.
+pub(super) fn outliers_again(was: &[bool], residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
+    let (off, far) = (beyond(OUTLIER, residual, runs, false), beyond(FAR, residual, runs, false));
+    (0..was.len()).map(|row| far[row] || off[row] && was[row]).collect()
+}
+
+/// `deviations`: how many standard deviations are too many.
+fn beyond(deviations: f64, residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> Vec<bool> {
     let mut out = vec![false; residual.len()];
     for run in runs.iter().filter(|run| run.len() > 20) {
         let mut off: Vec<(usize, f64)> = Vec::with_capacity(run.len());
@@ -105,7 +119,7 @@ pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> V
         let mut sizes: Vec<f64> = off.iter().map(|(_, d)| d.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let scale = (1.4826 * sizes[sizes.len() / 2]).max(FINEST);
-        for (i, (row, d)) in off.iter().enumerate().filter(|(_, (_, d))| d.abs() > OUTLIER * scale) {
+        for (i, (row, d)) in off.iter().enumerate().filter(|(_, (_, d))| d.abs() > deviations * scale) {
             if smooth {
                 out[*row] = true;
                 continue;
@@ -115,7 +129,7 @@ pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> V
             let around = &off[from..(from + 2 * AROUND + 1).min(off.len())];
             let mut near: Vec<f64> = around.iter().map(|(_, d)| d.abs()).collect();
             near.sort_by(f64::total_cmp);
-            out[*row] = d.abs() > OUTLIER * 1.4826 * near[near.len() / 2];
+            out[*row] = d.abs() > deviations * 1.4826 * near[near.len() / 2];
         }
         // A reading next to which the path itself jumps is none.
         let flagged = run.iter().filter(|row| out[**row]).count();

@@ -7,16 +7,30 @@ use crate::machine::Machine;
 /// By so much, a logarithm, the place has more evidence than all names together.
 const AHEAD: f64 = 5.0;
 
-/// The place whose series (69) say more than several names do together, with all the freedom of their shapes.
+/// A name at the place says all that is there, but for its shape, if it takes away at least this part of what the series do.
+const SAYS_ALL: f64 = 0.9;
+
+/// The place whose series (69) say more than several names do together, with all the freedom of their shapes; and the name there that
+/// nearly all of it has, if there is one: then the others were pieces of its shape.
 ///
 /// Two effects are told apart because neither a place nor a shape takes both. Pieces of which each takes a part of one thing fall behind
 /// a series that takes all of it, though that has ten times their number of coefficients. Settled positions show no course, and several
 /// joints give way there in their own ways.
-pub(super) fn outbid(search: &Search, active: &[Active], machine: &Machine) -> Option<Standing> {
+pub(super) fn outbid(
+    search: &Search,
+    active: &[Active],
+    machine: &Machine,
+) -> Option<(Standing, Option<usize>)> {
     if active.len() < 2 || !search.in_motion {
         return None;
     }
     let rare: f64 = active.iter().map(|effect| search.priors[effect.candidate]).sum();
     let names = search.worth(active) + rare;
-    standing(search, machine, search.base.clone()).filter(|series| series.evidence > names + AHEAD)
+    let series = standing(search, machine, search.base.clone())?;
+    let says_all = |i: &usize| {
+        let effect = &active[*i..=*i];
+        search.candidates[active[*i].candidate].place == series.place
+            && search.shares(effect).names > 2.0 * SAYS_ALL * series.gain
+    };
+    (series.evidence > names + AHEAD).then(|| (series, (0..active.len()).find(says_all)))
 }

@@ -10,6 +10,7 @@ use super::folds;
 use super::held_out::Model;
 use super::noise::Noise;
 use super::odds::{Odds, confusable, odds, trust};
+use super::orders;
 use super::outbid::outbid;
 use super::outliers;
 use super::placebo::{Placebo, placebo};
@@ -66,7 +67,12 @@ pub(super) fn report(
 ) -> Diagnosis {
     let linear = search.rows.linear;
     let shares = search.shares(active);
-    let mut doubt = doubt(search, active, machine, &shares, noise);
+    let mut doubt = match doubt(search, active, machine, &shares, noise) {
+        Some(Doubt { but: Some(i), .. }) => {
+            return report(search, &active[i..=i], machine, library, noise);
+        }
+        doubt => doubt,
+    };
     let mut told: Vec<(usize, Finding, Named)> = match doubt {
         Some(_) => Vec::new(),
         None => {
@@ -97,7 +103,7 @@ pub(super) fn report(
         let unlikely = told.iter().filter(|told| !holds(told));
         doubt = unlikely
             .max_by(|a, b| active[a.0].score.gain.total_cmp(&active[b.0].score.gain))
-            .map(|(i, ..)| Doubt { place: Some(place(i)), energy: 2.0 * active[*i].score.gain });
+            .map(|(i, ..)| Doubt::at(place(i), 2.0 * active[*i].score.gain));
         // Of a patchwork no piece is a name.
         let patchwork = told.len() - likely > likely;
         let both = told.into_iter().zip(placebos).filter(|(told, _)| !patchwork && holds(told));
@@ -148,6 +154,7 @@ pub(super) fn report(
     outliers::fill(search, &residual_of(search, &[]), &left_over, &mut diagnosis);
     folds::fill(search, &in_model, &mut diagnosis);
     traces::fill(search, &kept, &left_over, machine, &mut diagnosis);
+    orders::join(search, &kept, &mut diagnosis);
     diagnosis
 }
 
@@ -155,6 +162,14 @@ pub(super) fn report(
 struct Doubt {
     place: Option<Place>,
     energy: f64,
+    /// The effect that says nearly all of it by itself, if there is one.
+    but: Option<usize>,
+}
+
+impl Doubt {
+    fn at(place: Place, energy: f64) -> Self {
+        Doubt { place: Some(place), energy, but: None }
+    }
 }
 
 /// Why the names that were taken in do not explain what is there, if they do not.
@@ -182,10 +197,10 @@ fn doubt(
             && surprise > SURPRISE * memory * total;
     if is_unexplained {
         let energy = search.leftover(&search.base).energy.max(left.energy);
-        return Some(Doubt { place: patched, energy });
+        return Some(Doubt { place: patched, energy, but: None });
     }
-    if let Some(series) = outbid(search, active, machine) {
-        return Some(Doubt { place: Some(series.place), energy: 2.0 * series.gain });
+    if let Some((series, but)) = outbid(search, active, machine) {
+        return Some(Doubt { but, ..Doubt::at(series.place, 2.0 * series.gain) });
     }
     if search.in_motion {
         return None;
@@ -195,11 +210,11 @@ fn doubt(
     let beside = search.beside(active, None);
     let along = along_travel(search, machine, &beside)
         .filter(|along| along.beyond > ALONG * search.heat && is_much(along.energy))
-        .map(|along| Doubt { place: Some(Place::Joint(along.joint)), energy: along.energy });
+        .map(|along| Doubt::at(Place::Joint(along.joint), along.energy));
     along.or_else(|| {
         standing(search, machine, beside)
             .filter(|series| series.evidence > STANDING && is_much(2.0 * series.gain))
-            .map(|series| Doubt { place: Some(series.place), energy: 2.0 * series.gain })
+            .map(|series| Doubt::at(series.place, 2.0 * series.gain))
     })
 }
 

@@ -71,7 +71,7 @@ impl Case<'_> {
         let most_wild = if facts_are_smooth(facts) { WILD } else { 1.0 };
         // What is left is noise, once everything else is modelled: the noise is judged anew from it.
         let mut noise = noise_of(&linear, &linear.residual, &runs, &out, facts);
-        let mut active = Vec::new();
+        let mut active: Vec<Active> = Vec::new();
         let (mut round, mut moves, mut forgot) = (1, 0, false);
         loop {
             let rows =
@@ -95,6 +95,17 @@ impl Case<'_> {
             let is_settled = |judged: &[Noise]| noise.iter().zip(judged).all(|(a, b)| a.is_close(b));
             active = search.run(&active, |active| round == NOISE_ROUNDS || is_settled(&judge(active)));
             active = less_rare(&search, active);
+            if !search.in_motion && round < NOISE_ROUNDS {
+                // What was found hid how far single positions are off; a slip there and back again is one that is.
+                let lasting = |effect: &&Active| !search.is_event(effect.candidate);
+                let lasting: Vec<Active> = active.iter().filter(lasting).cloned().collect();
+                let off = noise::outliers_again(&out, &report::residual_of(&search, &lasting), &runs);
+                if !lasting.is_empty() && off != out {
+                    noise = noise_of(&linear, &report::residual_of(&search, &lasting), &runs, &off, facts);
+                    (out, active, round) = (off, lasting, round + 1);
+                    continue;
+                }
+            }
             let judged = judge(&active);
             let report = |search: &Search, active: &[Active]| -> Told {
                 let diagnosis = report::report(search, active, machine, library, &noise);

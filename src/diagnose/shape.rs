@@ -167,7 +167,7 @@ pub(super) fn is_curve(candidate: &Candidate) -> bool {
 }
 
 /// Whether it depends on where one joint stands and on nothing else, and is no wave.
-fn is_along_travel(candidate: &Candidate) -> bool {
+pub(super) fn is_along_travel(candidate: &Candidate) -> bool {
     is_of_position(candidate) && candidate.features.iter().all(|f| f.wave().is_none())
 }
 
@@ -197,6 +197,16 @@ pub(super) fn order(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> O
     let orders: Option<Vec<f64>> = candidate.features.iter().map(of).collect();
     let order = orders?.into_iter().fold(f64::INFINITY, f64::min);
     order.is_finite().then_some(order)
+}
+
+/// How many periods of it there are along the travel, where it is a wave of where one joint stands; else none.
+pub(super) fn periods(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> f64 {
+    let of = |feature: &Feature| {
+        let (_, phase) = feature.wave()?;
+        Some(extent(&phase.over(&rows.linear.samples, parameters)) / std::f64::consts::TAU)
+    };
+    let each = candidate.features.iter().map(|feature| of(feature).unwrap_or(0.0));
+    if is_of_position(candidate) { each.reduce(f64::min).unwrap_or(0.0) } else { 0.0 }
 }
 
 /// Where the extreme of a column is.

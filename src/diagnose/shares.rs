@@ -10,6 +10,10 @@ use crate::feature::Feature;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
 const OWN_SHAPE: f64 = 0.004;
 const OTHER_SHAPE: f64 = 0.002;
+/// The same of waves along the travel, as another function of it: gears mesh harder on one side.
+const SWELL: f64 = 0.02;
+/// So many periods are a train.
+const TRAIN: f64 = 6.0;
 /// A tone is heard in the edges of every other shape, and one course over time in another.
 const CLOCK_SHAPE: f64 = 0.01;
 /// A second line of the same family at the same place takes away at least this part of what the first does.
@@ -130,6 +134,11 @@ impl Search<'_> {
         a.told_as == b.told_as && a.place == b.place
     }
 
+    /// Whether two candidates are orders of one error motion.
+    pub fn is_one(&self, a: usize, b: usize) -> bool {
+        self.is_form(a, b) && self.candidates[a].as_one && self.candidates[b].as_one
+    }
+
     /// Whether it is little beside what was found already at its place and has its name, or is another shape along the travel where
     /// a curve was found: that is its shape.
     pub fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
@@ -168,15 +177,24 @@ impl Search<'_> {
         own.is_none_or(|own| own.round() % of.round() != 0.0)
     }
 
+    /// Whether an effect is a train of waves along the travel, and the rival another function of where the same joint stands.
+    fn is_swell(&self, rival: &Rival, effect: &Active) -> bool {
+        let (own, other) = (&self.candidates[effect.candidate], &self.candidates[rival.candidate]);
+        shape::is_along_travel(other) && shape::periods(self.rows, own, &effect.score.parameters) >= TRAIN
+    }
+
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place and where
     /// both go by the clock.
     pub fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
         let timed = |candidate: usize| self.goes_by_clock(candidate);
         let share = |effect: &Active| {
-            if self.is_no_shape(rival, effect) {
+            let is_here = place(effect.candidate) == place(rival.candidate);
+            if is_here && self.is_swell(rival, effect) {
+                SWELL
+            } else if self.is_no_shape(rival, effect) {
                 0.0
-            } else if place(effect.candidate) == place(rival.candidate) {
+            } else if is_here {
                 OWN_SHAPE
             } else if self.is_tone(rival.candidate) || timed(effect.candidate) && timed(rival.candidate) {
                 CLOCK_SHAPE

@@ -124,8 +124,10 @@ pub(super) fn fill(
         }
     }
     for (i, effect) in told.iter().enumerate() {
+        let is_other =
+            |(k, other): &(usize, &Active)| *k != i && !search.is_one(effect.candidate, other.candidate);
         let others: Vec<Active> =
-            told.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, effect)| effect.clone()).collect();
+            told.iter().enumerate().filter(is_other).map(|(_, other)| other.clone()).collect();
         let without = Model::new(search, &others).residual(search, &others);
         let along = match search.candidates[effect.candidate].place {
             Place::Joint(j) => Some(j),

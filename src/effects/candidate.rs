@@ -88,6 +88,8 @@ pub struct Candidate {
     pub least: usize,
     /// Itself, were it only what its name says more than, with the same parameters.
     pub more_than: Vec<Candidate>,
+    /// Found several times at one place, it is told as one, [`Family::as_one`].
+    pub as_one: bool,
     /// How often it is met, against 1 for backlash.
     pub often: f64,
     /// Coefficients up to this, SI, are usual whatever the deviation that they make.
@@ -337,6 +339,7 @@ fn candidate(
         parameters,
         grid: grid::points(&family.parameters, &ranges, travel, facts),
         least: family.least.unwrap_or(family.features.len()).min(own_features.len()),
+        as_one: family.as_one,
         often: family.often,
         usual_to: family.usual_to,
     })

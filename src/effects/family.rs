@@ -70,6 +70,9 @@ pub struct Family {
     /// Every joint has it, more or less: where it is found at one, the model may have it at the others too.
     #[serde(default)]
     pub at_every_joint: bool,
+    /// Found several times at one place, with other orders, it is one error motion and one finding.
+    #[serde(default)]
+    pub as_one: bool,
     /// Which places of a branch come into question.
     #[serde(default)]
     pub which: Which,

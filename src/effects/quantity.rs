@@ -20,6 +20,8 @@ pub fn in_words(value: f64, std_error: Option<f64>, dimension: Dimension, shown:
             let places = decimals(error, if first < 1.95 { 2 } else { 1 });
             format!("{value:.places$} ± {error:.places$}")
         }
+        // A whole number that is not measured but counted.
+        None if std_error == Some(0.0) && value.fract() == 0.0 => format!("{value:.0}"),
         None => format!("{value:.*}", decimals(value, 3)),
     };
     match unit.as_str() {
