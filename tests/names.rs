@@ -8,7 +8,7 @@ use kincal::effects::Library;
 use kincal::recording::Recording;
 
 /// A rotary axis to and fro over growing strokes, with an error of this size in deg; 0.2 mdeg of noise.
-fn said_of(error: impl Fn(f64, f64) -> f64, without: &[&str]) -> Diagnosis {
+fn said_of(mut error: impl FnMut(f64, f64) -> f64, without: &[&str]) -> Diagnosis {
     let machine = common::machine("rotary_axis");
     let mut noise = normals(3);
     let mut text = String::from("# measurement: joint\n# zero: unknown\nt[s],c[deg],c_meas[deg]\n");
@@ -39,6 +39,20 @@ fn a_straight_line_is_no_positioning_error() {
     // What bends keeps its name.
     let bent = |at: f64, _: f64| 2e-5 * at + 2e-3 * (at / 200.0).powi(2);
     assert_eq!(names(&said_of(bent, &["scale_error"])), ["positioning_error"]);
+}
+
+/// What turns round slowly is seen to cross its play: seven samples for 0.05 deg.
+#[test]
+fn play_that_is_seen_to_be_crossed_is_no_hysteresis() {
+    let mut driven = -0.025;
+    let play = |at: f64, _: f64| {
+        driven = f64::clamp(driven, at - 0.025, at + 0.025);
+        driven - at
+    };
+    let said = said_of(play, &[]);
+    assert_eq!(names(&said), ["backlash"]);
+    let width = said.findings[0].coefficients[0].value.to_degrees();
+    assert!((width - 0.05).abs() < 5e-4, "{width} deg");
 }
 
 #[test]

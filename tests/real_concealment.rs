@@ -2,7 +2,7 @@
 //! stay the machine's own.
 //!
 //! `KINCAL_DRAWS=60 cargo test --release --test real_concealment -- --nocapture` prints the whole table; `KINCAL_SEED` draws others, and
-//! `KINCAL_ONLY=15,31` diagnoses these alone. A recording whose command is
+//! `KINCAL_ONLY=15,31` diagnoses these alone, `KINCAL_WRITE=DIR` keeps what is diagnosed. A recording whose command is
 //! `q - e` and whose reading is that of `q` is one of a machine that is `e` off.
 
 mod common;
@@ -180,11 +180,22 @@ impl Set {
 
     /// The recordings with `command - effect` in place of the command.
     fn rewritten(&self, command: &str, effect: &[f64]) -> Vec<Recording> {
+        let texts = self.texts(command, effect).into_iter();
+        (self.files.iter().zip(texts))
+            .map(|((name, ..), text)| {
+                Recording::from_bytes(name, text.into_bytes(), &self.machine)
+                    .unwrap_or_else(|e| panic!("{e}"))
+            })
+            .collect()
+    }
+
+    /// The same as text.
+    fn texts(&self, command: &str, effect: &[f64]) -> Vec<String> {
         let mut next = effect.iter();
         self.files
             .iter()
             .enumerate()
-            .map(|(i, (name, head, rows))| {
+            .map(|(i, (_, head, rows))| {
                 let (at, factor) = self.column(i, command);
                 let mut text = head.join("\n") + "\n";
                 for row in rows {
@@ -193,8 +204,7 @@ impl Set {
                     cells[at] = format!("{:.12}", q - next.next().expect("as many") / factor);
                     text += &(cells.join(",") + "\n");
                 }
-                Recording::from_bytes(name, text.into_bytes(), &self.machine)
-                    .unwrap_or_else(|e| panic!("{e}"))
+                text
             })
             .collect()
     }
@@ -291,18 +301,31 @@ fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
             continue;
         }
         let size = effect.iter().fold(0.0f64, |m, e| m.max(e.abs()));
-        let said = set.diagnosis(&set.rewritten(&command, &effect));
+        let recordings = set.rewritten(&command, &effect);
+        if let Some(folder) = std::env::var_os("KINCAL_WRITE") {
+            let folder = std::path::Path::new(&folder).join(number.to_string());
+            std::fs::create_dir_all(&folder).expect("a folder");
+            for ((file, ..), text) in set.files.iter().zip(set.texts(&command, &effect)) {
+                std::fs::write(folder.join(file), text).expect("a file");
+            }
+        }
+        let said = set.diagnosis(&recordings);
         let told = names(&said);
         // The first that the set did not say of itself.
         let new: Vec<_> = told.iter().filter(|f| !own.findings.contains(f)).collect();
         let is_right = new.first().is_some_and(|(e, at)| concealed.is_named(e) && *at == command);
-        let is_kept = own.findings.iter().all(|f| told.contains(f));
+        // What it says of itself stays if it is told at all.
+        let stays = |(effect, at): &&(String, String)| {
+            said.findings.iter().any(|f| (&f.effect, &f.at) == (effect, at))
+        };
+        let gone: Vec<_> = own.findings.iter().filter(|f| !stays(f)).collect();
+        let is_kept = gone.is_empty();
         let count = table.entry((concealed.name(), ratio >= 2.0)).or_default();
         count.of += 1;
         count.right += usize::from(is_right);
         count.kept += usize::from(is_kept);
         println!(
-            "{number}: {} {} at {command}{}: {:.3} mrad or mm, {ratio:.2} times: {}, own findings {}; {new:?}, unexplained {:?}",
+            "{number}: {} {} at {command}{}: {:.3} mrad or mm, {ratio:.2} times: {}, own findings {}; {new:?}, gone {gone:?}, unexplained {:?}",
             set.name,
             concealed.name(),
             if set.has_time() { "" } else { " (no time)" },

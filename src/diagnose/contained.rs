@@ -4,11 +4,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::search::{Active, Rival, Search};
+use super::shape;
 use super::space::{Space, gram};
 use crate::effects::Candidate;
 
-/// What a wider name adds is next to nothing below this part of what it does, root mean square in m and rad.
+/// What a wider name adds is next to nothing below this part of what it does, root mean square in m and rad; and below this part where the
+/// simpler one is just what the wider one says more than, as lines along a travel are that bend a little.
 const NOTHING: f64 = 0.03;
+const LITTLE: f64 = 0.18;
 /// The simpler one takes at least this part of the energy.
 const NEARLY_ALL: f64 = 0.9;
 /// By so much is it then likelier than the wider one, as a logarithm of odds.
@@ -81,10 +84,16 @@ pub(super) fn prefer_simpler(search: &Search, rivals: &mut [Rival], close: usize
         .collect();
     let constant = DMatrix::from_columns(&constant);
     let (does, wide) = (beside(&does, &constant), beside(&wide, &constant));
+    let curve = Some(&search.candidates[best.candidate]).filter(|candidate| shape::is_curve(candidate));
+    let less: Vec<DMatrix<f64>> = (curve.iter().flat_map(|candidate| &candidate.more_than))
+        .filter_map(|less| search.rows.raw(less, &best.score.parameters))
+        .map(|less| beside(&less, &constant))
+        .collect();
     for i in simpler {
         let Some(own) = raw(&rivals[i]) else { continue };
         let own = beside(&own, &constant);
-        if left(&own, &wide) < CONTAINED && left(&does, &own) < NOTHING {
+        let is_less = less.iter().any(|less| left(&own, less) < CONTAINED && left(less, &own) < CONTAINED);
+        if left(&own, &wide) < CONTAINED && left(&does, &own) < if is_less { LITTLE } else { NOTHING } {
             rivals[i].weight = rivals[i].weight.max(best.weight + LIKELIER);
         }
     }

@@ -52,6 +52,10 @@ impl Noise {
 const OUTLIER: f64 = 5.0;
 /// The same of what was none before effects were found.
 const FAR: f64 = 8.0;
+/// So many samples before and behind a reversal belong to it, and so many reversals at which readings are off are more than chance, if
+/// they are half of all.
+const TURNING: usize = 5;
+const TWICE: usize = 2;
 /// So many readings on either side tell how rough it is around one.
 const AROUND: usize = 15;
 /// No instrument resolves less, m or rad.
@@ -138,6 +142,32 @@ fn beyond(deviations: f64, residual: &[f64], runs: &[Vec<usize>], smooth: bool) 
         }
     }
     out
+}
+
+/// Outliers of a continuous path that come where one joint turns round, time after time, are what it does there: play that is crossed
+/// within a few samples, a spike. They are none.
+pub(super) fn spare_reversals(linear: &Linear, out: &mut [bool]) {
+    let count = linear.spans.last().map_or(0, |span| span.samples.1);
+    let mut off = vec![false; count];
+    (out.iter().zip(&linear.sample)).for_each(|(out, sample)| off[*sample] |= out);
+    let mut spared = vec![false; count];
+    for j in 0..linear.samples.first().map_or(0, |samples| samples.joints.len()) {
+        let turns = linear.spans.iter().zip(&linear.samples).flat_map(|(span, samples)| {
+            let side = samples.joints[j].as_ref().map_or(&[][..], |joint| &joint.direction);
+            let around = |k: usize| {
+                let from = span.samples.0 + (k + 1).saturating_sub(TURNING);
+                from..(span.samples.0 + k + 1 + TURNING).min(span.samples.1)
+            };
+            (1..side.len()).filter(|k| side[*k] != side[*k - 1]).map(around).collect::<Vec<_>>()
+        });
+        let turns: Vec<_> = turns.collect();
+        let is_off = |around: &&std::ops::Range<usize>| off[(*around).clone()].contains(&true);
+        let loud: Vec<_> = turns.iter().filter(is_off).collect();
+        if loud.len() >= TWICE && 2 * loud.len() >= turns.len() {
+            loud.into_iter().for_each(|around| spared[around.clone()].fill(true));
+        }
+    }
+    (out.iter_mut().zip(&linear.sample)).for_each(|(out, sample)| *out &= !spared[*sample]);
 }
 
 /// A joint stands still within this part of its travel.

@@ -109,6 +109,9 @@ pub(super) fn report(
         let both = told.into_iter().zip(placebos).filter(|(told, _)| !patchwork && holds(told));
         (told, placebos) = both.unzip();
     }
+    let mut all: Vec<_> = told.into_iter().zip(placebos).collect();
+    all.sort_by(|(a, _), (b, _)| b.1.delta_bic.total_cmp(&a.1.delta_bic));
+    let (told, placebos): (Vec<_>, Vec<_>) = all.into_iter().unzip();
     let unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
     let kept: Vec<Active> = told.iter().map(|(i, ..)| active[*i].clone()).collect();
     let left_over = residual_of(search, &kept);

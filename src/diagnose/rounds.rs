@@ -62,6 +62,7 @@ impl Case<'_> {
         let mut coarse = Coarse::new(&linear, candidates.len());
         let mut out = noise::outliers(&linear.residual, &runs, facts_are_smooth(facts));
         if facts_are_smooth(facts) {
+            noise::spare_reversals(&linear, &mut out);
             out.iter_mut().zip(noise::waiting(&linear)).for_each(|(out, waiting)| *out |= waiting);
         }
         let total: f64 = candidates.iter().map(|c| c.often).sum();
@@ -101,7 +102,7 @@ impl Case<'_> {
                 let lasting: Vec<Active> = active.iter().filter(lasting).cloned().collect();
                 let off = noise::outliers_again(&out, &report::residual_of(&search, &lasting), &runs);
                 if !lasting.is_empty() && off != out {
-                    noise = noise_of(&linear, &report::residual_of(&search, &lasting), &runs, &off, facts);
+                    noise = noise_of(&linear, &report::residual_of(&search, &active), &runs, &off, facts);
                     (out, active, round) = (off, lasting, round + 1);
                     continue;
                 }

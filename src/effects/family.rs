@@ -126,10 +126,10 @@ impl Family {
         widest
     }
 
-    /// Whether a parameter is the travel in which something is taken up.
+    /// Whether a parameter is the travel in which something is taken up or crossed.
     pub(super) fn takes_up_in(&self, parameter: &str) -> bool {
         let named = |e: &Expression| matches!(e, Expression::Parameter(name) if name == parameter);
-        let takes = |e: &Expression| matches!(e, Expression::TakeUp(length) if length.any(&named));
+        let takes = |e: &Expression| matches!(e, Expression::TakeUp(length) | Expression::Play(length) if length.any(&named));
         self.features.iter().any(|feature| feature.any(&takes))
     }
 }
