@@ -11,7 +11,7 @@ const AHEAD: f64 = 5.0;
 const SAYS_ALL: f64 = 0.9;
 
 /// The place whose series (69) say more than several names do together, with all the freedom of their shapes; and the name there that
-/// nearly all of it has, if there is one: then the others were pieces of its shape.
+/// has nearly all of it, if there is one: then the others were pieces of its shape.
 ///
 /// Two effects are told apart because neither a place nor a shape takes both. Pieces of which each takes a part of one thing fall behind
 /// a series that takes all of it, though that has ten times their number of coefficients. Settled positions show no course, and several

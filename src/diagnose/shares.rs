@@ -10,7 +10,7 @@ use crate::feature::Feature;
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
 const OWN_SHAPE: f64 = 0.004;
 const OTHER_SHAPE: f64 = 0.002;
-/// The same of waves along the travel, as another function of it: gears mesh harder on one side.
+/// The same of a train of waves along the travel, seen as another function of where its joint stands: gears mesh harder on one side.
 const SWELL: f64 = 0.02;
 /// So many periods are a train.
 const TRAIN: f64 = 6.0;
