@@ -109,6 +109,7 @@ pub(super) fn report(
         let both = told.into_iter().zip(placebos).filter(|(told, _)| !patchwork && holds(told));
         (told, placebos) = both.unzip();
     }
+    // In order of evidence.
     let mut all: Vec<_> = told.into_iter().zip(placebos).collect();
     all.sort_by(|(a, _), (b, _)| b.1.delta_bic.total_cmp(&a.1.delta_bic));
     let (told, placebos): (Vec<_>, Vec<_>) = all.into_iter().unzip();
