@@ -93,7 +93,8 @@ pub(super) fn prefer_simpler(search: &Search, rivals: &mut [Rival], close: usize
         let Some(own) = raw(&rivals[i]) else { continue };
         let own = beside(&own, &constant);
         let is_less = less.iter().any(|less| left(&own, less) < CONTAINED && left(less, &own) < CONTAINED);
-        if left(&own, &wide) < CONTAINED && left(&does, &own) < if is_less { LITTLE } else { NOTHING } {
+        let added = if is_less { LITTLE } else { NOTHING };
+        if left(&own, &wide) < CONTAINED && left(&does, &own) < added {
             rivals[i].weight = rivals[i].weight.max(best.weight + LIKELIER);
         }
     }
