@@ -45,6 +45,7 @@ mod space;
 mod spectrum;
 mod speeds;
 mod stretch;
+mod sums;
 mod traces;
 mod unexplained;
 mod unfold;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::coarse::{AtPoint, Features, Level};
-use super::score::{BATCH, Best, Field, Rows, best, is_of_number, judge, key, lengths, unit};
+use super::score::{BATCH, Best, Equations, Field, Rows, best, is_of_number, judge, key, lengths, unit};
 use super::space::Space;
 use crate::effects::{Candidate, Slot};
 use crate::lie::Twist;
@@ -52,8 +52,8 @@ impl Rows<'_> {
                 g += part.tr_mul(&left.rows(first, rows));
                 from += rows;
             }
-            let gram = own.tr_mul(&own) - along.tr_mul(&along);
-            table[*i] = Some(best(candidate, &grid[*i], &lengths, &gram, &g, heat, usual));
+            let equations = Equations::of(&own, &along.as_view(), g);
+            table[*i] = Some(best(candidate, &grid[*i], &lengths, &equations, heat, usual));
         }
         for batch in everywhere.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
@@ -67,8 +67,8 @@ impl Rows<'_> {
                     from += rows;
                 }
             }
-            judge(&joined.columns(0, k * batch.len()), space, left, batch, &mut |i, gram, g| {
-                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat, usual));
+            judge(&joined.columns(0, k * batch.len()), space, left, batch, &mut |i, equations| {
+                table[i] = Some(best(candidate, &grid[i], &lengths, equations, heat, usual));
             });
         }
     }

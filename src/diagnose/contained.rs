@@ -49,7 +49,9 @@ pub(super) fn says_no_more(search: &Search, active: &[Active], i: usize) -> bool
     let is_name = |rival: &Rival| {
         let other = &search.candidates[rival.candidate];
         let takes = gain(other, &rival.score.parameters);
-        other.told_as != candidate.told_as
+        // Of a form of it, what it is told as is a name too.
+        (other.told_as != candidate.told_as
+            || other.effect != candidate.effect && other.effect == other.told_as)
             && other.place == candidate.place
             && takes >= enough
             && rival.weight + (own - takes) / search.heat + RARER > weight

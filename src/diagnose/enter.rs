@@ -10,6 +10,7 @@ use super::score::Score;
 use super::search::{Active, Rival, Search};
 use super::shape;
 use super::space::Space;
+use crate::effects::Candidate;
 use crate::feature::Feature;
 
 /// Parameters are others beside unknown states where that brings so much, as a logarithm.
@@ -63,8 +64,12 @@ impl Search<'_> {
 
     /// The same without states and shape.
     pub fn enter_bare(&self, rival: &Rival, space: &Space) -> Option<Active> {
+        self.enter_as(&self.candidates[rival.candidate], rival, space)
+    }
+
+    /// The same as another candidate than the rival's own.
+    pub fn enter_as(&self, candidate: &Candidate, rival: &Rival, space: &Space) -> Option<Active> {
         let mut score = rival.score.clone();
-        let candidate = &self.candidates[rival.candidate];
         let columns = self.rows.of(candidate, &score.parameters)?;
         let mut columns = columns.columns(0, score.coefficients) * score.room;
         let (mut gram, mut toward) = self.normal(&columns, space);

@@ -14,14 +14,7 @@ const FOLDS: usize = 5;
 /// into the diagnosis. Nonlinear parameters and the choice of effects stay as all samples gave them.
 pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) {
     let Some(folds) = Folds::new(search, told) else { return };
-    let count = folds.owner.len();
-    let owner = folds.owners_of_columns(told);
-    let with = |takes: &dyn Fn(usize) -> bool| -> Vec<f64> {
-        let columns: Vec<usize> = (0..owner.len()).filter(|c| owner[*c].is_none_or(takes)).collect();
-        let left = folds.left_out(search, &columns);
-        debug_assert_eq!(left.len(), count);
-        left
-    };
+    let with = |takes: &dyn Fn(usize) -> bool| folds.left_out(search, takes);
     let (geometric, last) = (with(&|_| false), with(&|_| true));
     let both = |angle: bool| {
         let rms = |left: &[f64]| rms_of(search, left, angle);
@@ -196,7 +189,7 @@ pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Act
         let better = each.filter(|(i, b)| *b > factor && is_harm(*i));
         match better.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((worst, _)) => drop(kept.remove(worst)),
-            None if folds.without_all(search, &kept) > factor && are_harm(&kept) => kept.clear(),
+            None if folds.without_all(search) > factor && are_harm(&kept) => kept.clear(),
             None => break,
         }
     }
@@ -207,10 +200,30 @@ pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Act
 struct Folds {
     /// Columns as they are, m and rad.
     raw: DMatrix<f64>,
+    /// What each column is of.
+    part: Vec<Part>,
     /// The fold of each row.
     owner: Vec<usize>,
     /// Of the whitened rows of each fold.
     grams: Vec<(DMatrix<f64>, DVector<f64>)>,
+}
+
+/// What a column is of.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    Geometry,
+    Effect(usize),
+    /// What an effect was before anybody looked.
+    State(usize),
+}
+
+impl Part {
+    fn effect(self) -> Option<usize> {
+        match self {
+            Part::Geometry => None,
+            Part::Effect(i) | Part::State(i) => Some(i),
+        }
+    }
 }
 
 impl Folds {
@@ -219,64 +232,74 @@ impl Folds {
         let rows = search.rows;
         let linear = rows.linear;
         let mut raw = linear.constant.clone();
-        for effect in told {
-            let (own, at) = (effect.raw(search)?, raw.ncols());
-            raw = raw.insert_columns(at, own.ncols(), 0.0);
-            raw.columns_mut(at, own.ncols()).copy_from(&own);
+        let mut part = vec![Part::Geometry; raw.ncols()];
+        let mut put = |own: &DMatrix<f64>, of: Part| {
+            let at = raw.ncols();
+            raw = std::mem::take(&mut raw).insert_columns(at, own.ncols(), 0.0);
+            raw.columns_mut(at, own.ncols()).copy_from(own);
+            part.extend(vec![of; own.ncols()]);
+        };
+        for (i, effect) in told.iter().enumerate() {
+            put(&effect.raw(search)?, Part::Effect(i));
+        }
+        for (i, effect) in told.iter().enumerate() {
+            if let Some(states) = search.states_of(effect) {
+                put(&states.raw(rows), Part::State(i));
+            }
         }
         let owner = owners(search)?;
         let mut white = raw.clone();
         rows.whiten(&mut white);
         let grams = grams(&white, &rows.residual, &owner);
-        Some(Folds { raw, owner, grams })
+        Some(Folds { raw, part, owner, grams })
     }
 
     /// By which factor the mean square of what is left out grows with each effect beside all others.
     fn without_each(&self, search: &Search, active: &[Active]) -> Vec<f64> {
-        let owner = self.owners_of_columns(active);
         let all = self.energy(search, &|_| true);
-        (0..active.len()).map(|i| all / self.energy(search, &|column| owner[column] != Some(i))).collect()
+        (0..active.len()).map(|i| all / self.energy(search, &|effect| effect != i)).collect()
     }
 
     /// By which factor it grows with all effects beside geometry.
-    fn without_all(&self, search: &Search, active: &[Active]) -> f64 {
-        let owner = self.owners_of_columns(active);
-        self.energy(search, &|_| true) / self.energy(search, &|column| owner[column].is_none())
+    fn without_all(&self, search: &Search) -> f64 {
+        self.energy(search, &|_| true) / self.energy(search, &|_| false)
     }
 
-    /// Which effect every column belongs to; none those of geometry.
-    fn owners_of_columns(&self, active: &[Active]) -> Vec<Option<usize>> {
-        let constants = self.raw.ncols() - active.iter().map(|e| e.columns.ncols()).sum::<usize>();
-        let mut owner: Vec<Option<usize>> = vec![None; constants];
-        active.iter().enumerate().for_each(|(i, e)| owner.extend(vec![Some(i); e.columns.ncols()]));
-        owner
-    }
-
-    /// Whitened sum of squares of what is left out, with these columns.
+    /// Whitened sum of squares of what is left out, with these effects.
     fn energy(&self, search: &Search, takes: &dyn Fn(usize) -> bool) -> f64 {
-        let columns: Vec<usize> = (0..self.raw.ncols()).filter(|column| takes(*column)).collect();
-        let left = self.left_out(search, &columns);
+        let left = self.left_out(search, takes);
         let mut white = vec![0.0; left.len()];
         search.rows.whitener.apply(&left, &mut white);
         white.iter().map(|x| x * x).sum()
     }
 
-    /// Residuals of every row under the fit of these columns to the folds that the row is not in, m and rad.
-    fn left_out(&self, search: &Search, columns: &[usize]) -> Vec<f64> {
-        let total = |of: &dyn Fn(usize) -> bool| {
-            let width = self.raw.ncols();
-            let start = (DMatrix::<f64>::zeros(width, width), DVector::<f64>::zeros(width));
-            let used = self.grams.iter().enumerate().filter(|(fold, _)| of(*fold));
-            let (gram, b) = used.fold(start, |(g, b), (_, (own, toward))| (g + own, b + toward));
-            (gram.select_rows(columns).select_columns(columns), b.select_rows(columns))
+    /// Residuals of every row under the fit of geometry and these effects to the folds that the row is not in, m and rad. What the effects were
+    /// before anybody looked, no other stretch knows: that is found again in the one that was left out.
+    fn left_out(&self, search: &Search, takes: &dyn Fn(usize) -> bool) -> Vec<f64> {
+        let used = |c: &usize| self.part[*c].effect().is_none_or(takes);
+        let columns: Vec<usize> = (0..self.part.len()).filter(used).collect();
+        // States come last.
+        let lasting = columns.iter().filter(|c| !matches!(self.part[**c], Part::State(_))).count();
+        let states = columns.len() - lasting;
+        let of_columns = |(gram, b): (&DMatrix<f64>, &DVector<f64>)| {
+            (gram.select_rows(&columns).select_columns(&columns), b.select_rows(&columns))
         };
-        let solutions: Vec<Option<DVector<f64>>> = (0..FOLDS)
-            .map(|fold| {
-                let (mut gram, b) = total(&|other| other != fold);
-                (0..columns.len()).for_each(|i| gram[(i, i)] += 1.0);
-                Cholesky::new(gram).map(|cholesky| cholesky.solve(&b))
-            })
-            .collect();
+        let solved = |fold: usize| -> Option<DVector<f64>> {
+            let width = columns.len();
+            let start = (DMatrix::identity(width, width), DVector::zeros(width));
+            let others = (0..FOLDS).filter(|other| *other != fold).map(|other| &self.grams[other]);
+            let (gram, b) = others
+                .map(|(gram, b)| of_columns((gram, b)))
+                .fold(start, |(g, b), own| (g + own.0, b + own.1));
+            let mut x = Cholesky::new(gram)?.solve(&b);
+            let (gram, b) = of_columns((&self.grams[fold].0, &self.grams[fold].1));
+            let own = gram.view((lasting, lasting), (states, states)) + DMatrix::identity(states, states);
+            let toward =
+                b.rows(lasting, states) - gram.view((lasting, 0), (states, lasting)) * x.rows(0, lasting);
+            x.rows_mut(lasting, states).copy_from(&Cholesky::new(own)?.solve(&toward));
+            Some(x)
+        };
+        let solutions: Vec<Option<DVector<f64>>> = (0..FOLDS).map(solved).collect();
         let residual = &search.rows.linear.residual;
         (0..residual.len())
             .map(|row| match &solutions[self.owner[row]] {

@@ -58,6 +58,8 @@ const TURNING: usize = 5;
 const TWICE: usize = 2;
 /// So many readings on either side tell how rough it is around one.
 const AROUND: usize = 15;
+/// Readings differ by this part of the step that they are rounded to at least, though most of them may be the same.
+const STEPS: f64 = 0.5;
 /// No instrument resolves less, m or rad.
 const FINEST: f64 = 1e-10;
 /// Two estimates of the memory that differ by less tell of the same noise.
@@ -97,19 +99,30 @@ fn is_pause(span: &Span, last: Option<f64>, now: Option<f64>) -> bool {
 
 /// Rows that lie far off their neighbours: by the median of the two on either side.
 /// `smooth`: along a continuous path one scale holds for all; settled positions are compared with those around them.
-pub(super) fn outliers(residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> Vec<bool> {
-    beyond(OUTLIER, residual, runs, smooth)
+pub(super) fn outliers(linear: &Linear, runs: &[Vec<usize>], smooth: bool) -> Vec<bool> {
+    beyond(OUTLIER, linear, &linear.residual, runs, smooth)
 }
 
 /// The same of settled positions where effects were found, `residual` beside them: what was no outlier among all that they did has to be
 /// farther off.
-pub(super) fn outliers_again(was: &[bool], residual: &[f64], runs: &[Vec<usize>]) -> Vec<bool> {
-    let (off, far) = (beyond(OUTLIER, residual, runs, false), beyond(FAR, residual, runs, false));
+pub(super) fn outliers_again(
+    was: &[bool],
+    linear: &Linear,
+    residual: &[f64],
+    runs: &[Vec<usize>],
+) -> Vec<bool> {
+    let [off, far] = [OUTLIER, FAR].map(|deviations| beyond(deviations, linear, residual, runs, false));
     (0..was.len()).map(|row| far[row] || off[row] && was[row]).collect()
 }
 
 /// `deviations`: how many standard deviations are too many.
-fn beyond(deviations: f64, residual: &[f64], runs: &[Vec<usize>], smooth: bool) -> Vec<bool> {
+fn beyond(
+    deviations: f64,
+    linear: &Linear,
+    residual: &[f64],
+    runs: &[Vec<usize>],
+    smooth: bool,
+) -> Vec<bool> {
     let mut out = vec![false; residual.len()];
     for run in runs.iter().filter(|run| run.len() > 20) {
         let mut off: Vec<(usize, f64)> = Vec::with_capacity(run.len());
@@ -122,7 +135,8 @@ fn beyond(deviations: f64, residual: &[f64], runs: &[Vec<usize>], smooth: bool) 
         }
         let mut sizes: Vec<f64> = off.iter().map(|(_, d)| d.abs()).collect();
         sizes.sort_by(f64::total_cmp);
-        let scale = (1.4826 * sizes[sizes.len() / 2]).max(FINEST);
+        let least = (STEPS * linear.step(linear.angle[run[0]])).max(FINEST);
+        let scale = (1.4826 * sizes[sizes.len() / 2]).max(least);
         for (i, (row, d)) in off.iter().enumerate().filter(|(_, (_, d))| d.abs() > deviations * scale) {
             if smooth {
                 out[*row] = true;
@@ -133,7 +147,7 @@ fn beyond(deviations: f64, residual: &[f64], runs: &[Vec<usize>], smooth: bool) 
             let around = &off[from..(from + 2 * AROUND + 1).min(off.len())];
             let mut near: Vec<f64> = around.iter().map(|(_, d)| d.abs()).collect();
             near.sort_by(f64::total_cmp);
-            out[*row] = d.abs() > deviations * 1.4826 * near[near.len() / 2];
+            out[*row] = d.abs() > deviations * (1.4826 * near[near.len() / 2]).max(least);
         }
         // A reading next to which the path itself jumps is none.
         let flagged = run.iter().filter(|row| out[**row]).count();

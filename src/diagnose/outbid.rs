@@ -1,5 +1,6 @@
 //! Several names that one place without a name outbids: a patchwork, `docs/diagnosis.md` (77).
 
+use super::evidence::log_mean_exp;
 use super::search::{Active, Search};
 use super::whereabouts::{Standing, standing};
 use crate::machine::Machine;
@@ -10,8 +11,8 @@ const AHEAD: f64 = 5.0;
 /// A name at the place says all that is there, but for its shape, if it takes away at least this part of what the series do.
 const SAYS_ALL: f64 = 0.9;
 
-/// The place whose series (69) say more than several names do together, with all the freedom of their shapes; and the name there that
-/// has nearly all of it, if there is one: then the others were pieces of its shape.
+/// The place whose series (69) say more than several names do together, as likely as not with the freedom of their shapes; and the name there
+/// that has nearly all of it, if there is one: then the others were pieces of its shape.
 ///
 /// Two effects are told apart because neither a place nor a shape takes both. Pieces of which each takes a part of one thing fall behind
 /// a series that takes all of it, though that has ten times their number of coefficients. Settled positions show no course, and several
@@ -25,7 +26,8 @@ pub(super) fn outbid(
         return None;
     }
     let rare: f64 = active.iter().map(|effect| search.priors[effect.candidate]).sum();
-    let names = search.worth(active) + rare;
+    let plain: Vec<Active> = active.iter().map(Active::without_shape).collect();
+    let names = log_mean_exp(&[search.worth(active), search.worth(&plain)]) + rare;
     let series = standing(search, machine, search.base.clone())?;
     let says_all = |i: &usize| {
         let effect = &active[*i..=*i];

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::score::{Score, best, judge, lengths};
-use super::search::{Active, Search};
+use super::search::{Active, Rival, Search};
 use crate::effects::{Candidate, Place};
 use crate::machine::Machine;
 
@@ -30,11 +30,23 @@ pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Ma
     let field = rows.field(search.beside(active, Some(i)));
     let here = rows.score_at(own, &effect.score.parameters, &field, search.heat)?;
     let weighs = own.features.iter().any(|feature| feature.needs_gravity());
-    let of = |cause: String, score: &Score, raw: &DMatrix<f64>| Placebo {
-        cause,
-        share: score.gain / here.gain.max(f64::MIN_POSITIVE),
-        ahead: score.at_best - here.at_best,
-        raw: raw.columns(0, score.coefficients) * score.room,
+    // Half the energy that it takes away, and its evidence; what it was before anybody looked is no less its own.
+    let says = |candidate: &Candidate, score: &Score| {
+        let rival = Rival::new(effect.candidate, score.at_best, score.clone());
+        match search.with_state(candidate, &rival, &field) {
+            Some(more) if more.evidence > 0.0 => (more.reach, score.at_best + more.evidence),
+            _ => (score.gain, score.at_best),
+        }
+    };
+    let (gain, evidence) = says(own, &here);
+    let of = |cause: String, candidate: &Candidate, score: &Score, raw: &DMatrix<f64>| {
+        let (own_gain, own_evidence) = says(candidate, score);
+        Placebo {
+            cause,
+            share: own_gain / gain.max(f64::MIN_POSITIVE),
+            ahead: own_evidence - evidence,
+            raw: raw.columns(0, score.coefficients) * score.room,
+        }
     };
     let driven = search.candidates.iter().enumerate().filter_map(|(k, other)| {
         let joint = moved_by(own, other)?;
@@ -42,7 +54,7 @@ pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Ma
         let score = rows.screen(k, &candidate, &field, search.heat)?;
         let what = if weighs { "the weight on" } else { "the motion of" };
         let cause = format!("{what} {}", Place::Joint(joint).name(machine));
-        Some(of(cause, &score, &rows.raw(&candidate, &score.parameters)?))
+        Some(of(cause, &candidate, &score, &rows.raw(&candidate, &score.parameters)?))
     });
     let elsewhere = (1..if weighs { PARTS } else { 1 }).filter_map(|part| {
         let raw = rows.raw_elsewhere(own, &effect.score.parameters, part as f64 / PARTS as f64)?;
@@ -50,10 +62,10 @@ pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Ma
         rows.whiten(&mut white);
         let usual = rows.usual_sizes(own, std::slice::from_ref(&effect.score.parameters));
         let (at, mut score) = (&effect.score.parameters, None);
-        judge(&white.as_view(), &field.space, &field.left, &[0], &mut |_, gram, g| {
-            score = Some(best(own, at, &lengths(own), gram, g, search.heat, usual).at(at));
+        judge(&white.as_view(), &field.space, &field.left, &[0], &mut |_, equations| {
+            score = Some(best(own, at, &lengths(own), equations, search.heat, usual).at(at));
         });
-        Some(of("the weights of other poses".into(), &score?, &raw))
+        Some(of("the weights of other poses".into(), own, &score?, &raw))
     });
     driven.chain(elsewhere).max_by(|a, b| a.share.total_cmp(&b.share))
 }

@@ -3,6 +3,8 @@
 use super::evidence::log_mean_exp;
 use super::score::Field;
 use super::search::{LARGE, MANY, Rival, Search};
+use super::shape;
+use crate::effects::Candidate;
 use crate::feature::Feature;
 
 /// Effects with a memory are looked at with what they were before down to this part of the best one's weight, and so many of them.
@@ -13,6 +15,14 @@ const FOREIGN: f64 = 0.01;
 
 /// Evidence that a shape of its own may lend a rival, as part of the energy that it takes away.
 const OWN: f64 = 0.25;
+
+/// An effect together with what nobody knows of how it was before.
+pub(super) struct WithState {
+    /// Logarithm of the evidence that this adds.
+    pub evidence: f64,
+    /// Half the misfit energy that both take away.
+    pub reach: f64,
+}
 
 impl Search<'_> {
     /// Brings up effects with a memory that take away much with what nobody knows of how they were before: as far as their evidence with
@@ -30,21 +40,32 @@ impl Search<'_> {
         let chosen: Vec<usize> = (0..worthy).filter(|i| remembers(&rivals[*i])).take(REMEMBERED).collect();
         for i in chosen {
             let rival = &mut rivals[i];
-            let state = self.enter_bare(rival, &field.space).map(|effect| self.state_of(&effect));
-            let Some(state) = state.filter(|state| state.ncols() > 0) else { continue };
-            let beside = self.rows.field(field.space.with(&state));
-            let candidate = &self.candidates[rival.candidate];
-            let Some(score) = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)
-            else {
+            let Some(more) = self.with_state(&self.candidates[rival.candidate], rival, field) else {
                 continue;
             };
-            let worth = field.space.worth(&state, &field.left, self.heat);
-            ranks[i] = rival.weight + (worth + score.at_best - rival.score.at_best).max(0.0);
-            rival.reach = score.gain + (worth * self.heat).max(0.0);
+            ranks[i] = rival.weight + more.evidence.max(0.0);
+            rival.reach = more.reach;
         }
         let mut order: Vec<usize> = (0..rivals.len()).collect();
         order.sort_by(|a, b| ranks[*b].total_cmp(&ranks[*a]));
         *rivals = order.into_iter().map(|i| rivals[i].clone()).collect();
+    }
+
+    /// What a rival, taken for this candidate, says together with what it was before; `None` where it has no memory, or all of that is known.
+    pub fn with_state(&self, candidate: &Candidate, rival: &Rival, field: &Field) -> Option<WithState> {
+        let effect = self.enter_as(candidate, rival, &field.space).filter(|_| self.in_motion)?;
+        let answers = shape::answers(self.rows, candidate, &effect);
+        let state = shape::states(self.rows, candidate, &effect, answers).white;
+        if state.ncols() == 0 {
+            return None;
+        }
+        let beside = self.rows.field(field.space.with(&state));
+        let score = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)?;
+        let worth = field.space.worth(&state, &field.left, self.heat);
+        Some(WithState {
+            evidence: worth + score.at_best - rival.score.at_best,
+            reach: score.gain + (worth * self.heat).max(0.0),
+        })
     }
 
     /// The weight of a rival of which as likely as not the shape departs from the family's, (66).

@@ -17,11 +17,12 @@ use super::placebo::{Placebo, placebo};
 use super::search::{Active, Rival, Search, all_but};
 use super::set_ups;
 use super::shares::Shares;
+use super::space::Space;
 use super::speeds::levelled;
 use super::stretch::wheres;
 use super::traces::{self, Traces};
 use super::unexplained::{self, Unexplained};
-use super::whereabouts::{standing, whereabouts};
+use super::whereabouts::{Standing, standing, whereabouts};
 use crate::effects::{Library, Place, in_words};
 use crate::feature::Dimension;
 use crate::machine::Machine;
@@ -165,6 +166,8 @@ pub(super) fn report(
 /// Structure without a name: where, if that is known, and its energy in units of the noise's variance.
 struct Doubt {
     place: Option<Place>,
+    /// Another joint whose position it goes with.
+    with: Option<usize>,
     energy: f64,
     /// The effect that says nearly all of it by itself, if there is one.
     but: Option<usize>,
@@ -172,7 +175,11 @@ struct Doubt {
 
 impl Doubt {
     fn at(place: Place, energy: f64) -> Self {
-        Doubt { place: Some(place), energy, but: None }
+        Doubt { place: Some(place), with: None, energy, but: None }
+    }
+
+    fn standing(series: &Standing) -> Self {
+        Doubt { with: series.with, ..Doubt::at(series.place, 2.0 * series.gain) }
     }
 }
 
@@ -201,25 +208,27 @@ fn doubt(
             && surprise > SURPRISE * memory * total;
     if is_unexplained {
         let energy = search.leftover(&search.base).energy.max(left.energy);
-        return Some(Doubt { place: patched, energy, but: None });
+        return Some(Doubt { place: patched, with: None, energy, but: None });
     }
     if let Some((series, but)) = outbid(search, active, machine) {
-        return Some(Doubt { but, ..Doubt::at(series.place, 2.0 * series.gain) });
+        return Some(Doubt { but, ..Doubt::standing(&series) });
     }
-    if search.in_motion {
-        return None;
-    }
-    // Settled positions show no course, but they may show a function of where a joint stands, or of something else that is known.
     let is_much = |energy: f64| energy > TOLERATED * (total + energy);
     let beside = search.beside(active, None);
+    let series = |beside: Space| {
+        standing(search, machine, beside)
+            .filter(|series| series.evidence > STANDING && is_much(2.0 * series.gain))
+            .map(|series| Doubt::standing(&series))
+    };
+    if search.in_motion {
+        // What is much shows in blocks of samples, what is weak in a series alone.
+        return active.is_empty().then(|| series(beside)).flatten();
+    }
+    // Settled positions show no course, but they may show a function of where a joint stands, or of something else that is known.
     let along = along_travel(search, machine, &beside)
         .filter(|along| along.beyond > ALONG * search.heat && is_much(along.energy))
         .map(|along| Doubt::at(Place::Joint(along.joint), along.energy));
-    along.or_else(|| {
-        standing(search, machine, beside)
-            .filter(|series| series.evidence > STANDING && is_much(2.0 * series.gain))
-            .map(|series| Doubt::at(series.place, 2.0 * series.gain))
-    })
+    along.or_else(|| series(beside))
 }
 
 /// What is said of effect `i`; nothing where its rivals leave too little evidence.
@@ -298,7 +307,9 @@ fn finding(
 /// What is said of structure without a name.
 fn unexplained(search: &Search, machine: &Machine, noise: &[Noise], doubt: &Doubt) -> Unexplained {
     let left_by_geometry = search.base.apply(&search.rows.residual);
-    let at = doubt.place.unwrap_or_else(|| whereabouts(search, machine)).name(machine);
+    let (place, with) = doubt.place.map_or_else(|| whereabouts(search, machine), |place| (place, doubt.with));
+    let at = place.name(machine);
+    let goes_with = with.map(|joint| Place::Joint(joint).name(machine));
     let length = noise_of(search, noise, false);
     let sigma = length.or(noise_of(search, noise, true)).unwrap_or(1.0);
     let rms_m = sigma * (doubt.energy / search.rows.whitener.count().max(1) as f64).sqrt();
@@ -309,10 +320,13 @@ fn unexplained(search: &Search, machine: &Machine, noise: &[Noise], doubt: &Doub
     let (r#where, gathers) = unexplained::gathered(search, machine, left_by_geometry.as_slice());
     let mut explanation =
         format!("structure of {size} is left that no named effect explains; it fits best at {at}");
+    if let Some(other) = &goes_with {
+        explanation += &format!(" and goes with where {other} stands too");
+    }
     for gathering in &gathers {
         explanation += &format!("; {}", gathering.in_words());
     }
-    Unexplained { rms_m, at, r#where, gathers, explanation }
+    Unexplained { rms_m, at, goes_with, r#where, gathers, explanation }
 }
 
 /// Standard deviation of the noise of lengths (m) or angles (rad), where such were read.

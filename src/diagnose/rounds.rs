@@ -60,7 +60,7 @@ impl Case<'_> {
         let mut candidates = plain.to_vec();
         let runs = noise::runs(&linear);
         let mut coarse = Coarse::new(&linear, candidates.len());
-        let mut out = noise::outliers(&linear.residual, &runs, facts_are_smooth(facts));
+        let mut out = noise::outliers(&linear, &runs, facts_are_smooth(facts));
         if facts_are_smooth(facts) {
             noise::spare_reversals(&linear, &mut out);
             out.iter_mut().zip(noise::waiting(&linear)).for_each(|(out, waiting)| *out |= waiting);
@@ -100,7 +100,8 @@ impl Case<'_> {
                 // What was found hid how far single positions are off; a slip there and back again is one that is.
                 let lasting = |effect: &&Active| !search.is_event(effect.candidate);
                 let lasting: Vec<Active> = active.iter().filter(lasting).cloned().collect();
-                let off = noise::outliers_again(&out, &report::residual_of(&search, &lasting), &runs);
+                let off =
+                    noise::outliers_again(&out, &linear, &report::residual_of(&search, &lasting), &runs);
                 if !lasting.is_empty() && off != out {
                     noise = noise_of(&linear, &report::residual_of(&search, &active), &runs, &off, facts);
                     (out, active, round) = (off, lasting, round + 1);

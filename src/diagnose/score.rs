@@ -42,8 +42,34 @@ pub(super) struct Field {
 /// A column that several candidates share.
 pub(super) type Column = Arc<Vec<f64>>;
 
-/// What is done with a point's Gram matrix and its way to the residuals.
-type Take<'a> = dyn FnMut(usize, &DMatrix<f64>, &DVector<f64>) + 'a;
+/// What is done with a point's normal equations.
+type Take<'a> = dyn FnMut(usize, &Equations) + 'a;
+
+/// Normal equations of columns beside a space.
+pub(super) struct Equations {
+    /// Gram matrix of what the space leaves of the columns.
+    pub gram: DMatrix<f64>,
+    /// The columns times the residuals.
+    pub toward: DVector<f64>,
+    /// Square norms of the columns themselves.
+    whole: DVector<f64>,
+}
+
+impl Equations {
+    /// `along`: what the space takes of the columns.
+    pub fn of(columns: &DMatrixView<f64>, along: &DMatrixView<f64>, toward: DVector<f64>) -> Self {
+        let (own, taken) = match columns.ncols() > WIDE {
+            true => (columns.transpose() * columns, along.transpose() * along),
+            false => (columns.tr_mul(columns), along.tr_mul(along)),
+        };
+        Equations { whole: own.diagonal(), gram: own - taken, toward }
+    }
+
+    /// Whether the space leaves next to nothing of one of the first columns, so that what is put together in blocks does not tell it.
+    fn is_faint(&self, columns: usize) -> bool {
+        (0..columns).any(|c| self.gram[(c, c)] < BARELY * self.whole[c])
+    }
+}
 
 /// What tells a column: kind of slot, joint, direction.
 pub(super) type Key = (usize, usize, [u64; 6]);
@@ -242,7 +268,8 @@ impl<'a> Rows<'a> {
             let part = (exact.fold(0.0, f64::max) / rough.max(1e-300)).min(1.0);
             for (best, gain) in table.iter_mut().zip(&gains).filter(|(best, _)| best.is_none()) {
                 let gain = 0.5 * part * gain;
-                *best = Some(Best { evidence: gain / heat + none, length: lengths[0], gain, room: ROOM });
+                let evidence = gain / heat + none;
+                *best = Some(Best { evidence, length: lengths[0], gain, room: ROOM, is_faint: false });
             }
             let mut summary = summary(&candidate.grid, &table, &peaks)?;
             let nearly =
@@ -256,8 +283,14 @@ impl<'a> Rows<'a> {
         let mut rough = summary(&candidate.grid, &table, &all)?;
         let halves = candidate.grid.iter().filter(|at| candidate.is_half(at, &rough.parameters)).cloned();
         rough.also = halves.collect();
+        if kept.is_none() {
+            return Some(rough);
+        }
+        let best =
+            candidate.grid.iter().position(|at| *at == rough.parameters).and_then(|i| table[i].as_ref());
+        let is_faint = best.is_some_and(|best| best.is_faint);
         let is_nothing = rough.at_best <= 0.0 && !candidate.jumps();
-        if kept.is_none() || !self.whitener.remembers() || is_nothing {
+        if !is_faint && (!self.whitener.remembers() || is_nothing) {
             return Some(rough);
         }
         // White rows of noise that remembers are differences: what jumps is in a single one, and drowns in its block.
@@ -314,14 +347,14 @@ impl<'a> Rows<'a> {
                     built.push(*i);
                 }
             }
-            judge(&joined.columns(0, k * built.len()), space, left, &built, &mut |i, gram, g| {
-                table[i] = Some(best(candidate, &grid[i], &lengths, gram, g, heat, usual));
+            judge(&joined.columns(0, k * built.len()), space, left, &built, &mut |i, equations| {
+                table[i] = Some(best(candidate, &grid[i], &lengths, equations, heat, usual));
             });
         }
     }
 }
 
-/// Judges columns, as many for each of these points, beside a space: what is left of their Gram matrix, and of what leads to the residuals.
+/// Judges columns, as many for each of these points, beside a space.
 pub(super) fn judge(
     joined: &DMatrixView<f64>,
     space: &Space,
@@ -333,11 +366,7 @@ pub(super) fn judge(
     let (along, toward) = (space.along(joined), joined.tr_mul(left));
     for (b, i) in points.iter().enumerate() {
         let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
-        let gram = match k > WIDE {
-            true => columns.transpose() * columns - own.transpose() * own,
-            false => columns.tr_mul(&columns) - own.tr_mul(&own),
-        };
-        take(*i, &gram, &toward.rows(b * k, k).into_owned());
+        take(*i, &Equations::of(&columns, &own, toward.rows(b * k, k).into_owned()));
     }
 }
 
@@ -346,18 +375,19 @@ pub(super) fn best(
     candidate: &Candidate,
     at: &[f64],
     lengths: &[usize],
-    gram: &DMatrix<f64>,
-    g: &DVector<f64>,
+    equations: &Equations,
     heat: f64,
     usual: usize,
 ) -> Best {
     let lengths = if candidate.has_overtones(at) { lengths } else { &lengths[..1] };
-    let all: Vec<Worth> = lengths.iter().map(|length| evidence(gram, g, *length, heat, usual)).collect();
+    let Equations { gram, toward, .. } = equations;
+    let all: Vec<Worth> = lengths.iter().map(|length| evidence(gram, toward, *length, heat, usual)).collect();
     let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
     let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
     let Worth { gain, size, .. } = all[best];
     let room = if size > 1.0 { ROOM_BEYOND * size } else { ROOM };
-    Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room }
+    let is_faint = equations.is_faint(lengths[best]);
+    Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room, is_faint }
 }
 
 /// Candidate at one point of its grid.
@@ -367,6 +397,8 @@ pub(super) struct Best {
     length: usize,
     gain: f64,
     room: f64,
+    /// Whether the space leaves next to nothing of one of its columns.
+    is_faint: bool,
 }
 
 impl Best {
@@ -384,6 +416,8 @@ impl Best {
     }
 }
 
+/// A space that leaves less than this part of a column's square leaves next to nothing of it.
+const BARELY: f64 = 1e-2;
 /// More columns than this are multiplied by blocks.
 const WIDE: usize = 5;
 /// Grids larger than this are screened by a spectrum, where the features are sines.

@@ -55,6 +55,11 @@ impl Active {
         units.iter().map(|unit| self.score.room * unit).collect()
     }
 
+    /// With a shape that is quite the family's.
+    pub(super) fn without_shape(&self) -> Active {
+        Active { shape: DMatrix::zeros(self.columns.nrows(), 0), ..self.clone() }
+    }
+
     /// In the place of another.
     pub(super) fn instead_of(self, other: &Active) -> Active {
         Active { near: other.near.clone(), hidden: other.hidden, ..self }

@@ -100,6 +100,18 @@ pub(super) struct Columns {
 }
 
 impl Columns {
+    /// As they are, m and rad.
+    pub fn raw(&self, rows: &Rows) -> DMatrix<f64> {
+        let mut raw = DMatrix::zeros(self.white.nrows(), self.white.ncols());
+        let mut numbers = vec![0.0; self.white.ncols()];
+        for (c, mut column) in raw.column_iter_mut().enumerate() {
+            numbers[c] = 1.0;
+            column.copy_from_slice(&self.sum(rows, &numbers));
+            numbers[c] = 0.0;
+        }
+        raw
+    }
+
     /// As they are, m and rad, each times its number, added up.
     pub fn sum(&self, rows: &Rows, numbers: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.white.nrows()];

@@ -18,6 +18,8 @@ const TRAIN: f64 = 6.0;
 const CLOCK_SHAPE: f64 = 0.01;
 /// A second line of the same family at the same place takes away at least this part of what the first does.
 const REPEATED: f64 = 0.15;
+/// What takes away this part of what shapes take up and leave beside a curve is no shape of it.
+const ALL: f64 = 0.9;
 /// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
 const SHAPE: f64 = 0.35;
 
@@ -140,14 +142,18 @@ impl Search<'_> {
     }
 
     /// Whether it is little beside what was found already at its place and has its name, or is another shape along the travel where
-    /// a curve was found: that is its shape.
+    /// a curve was found: that is its shape, unless along a path it alone is all that the curve does not say.
     pub fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
         let of = |candidate: usize| (&self.candidates[candidate].effect, self.candidates[candidate].place);
-        let alike = |a: &Active| {
-            of(a.candidate) == of(rival.candidate)
-                || shape::is_of_curve(&self.candidates[a.candidate], &self.candidates[rival.candidate])
+        let is_alike = |a: &Active| of(a.candidate) == of(rival.candidate);
+        let is_of_curve =
+            |a: &Active| shape::is_of_curve(&self.candidates[a.candidate], &self.candidates[rival.candidate]);
+        let is_all = || {
+            let shares = self.shares(active);
+            2.0 * rival.score.gain > ALL * (shares.shapes + shares.left.energy)
         };
-        active.iter().any(|a| rival.score.gain < REPEATED * a.score.gain && alike(a))
+        let mut small = active.iter().filter(|a| rival.score.gain < REPEATED * a.score.gain);
+        small.any(|a| is_alike(a) || is_of_curve(a) && !(self.in_motion && is_all()))
     }
 
     /// Whether it changes with time, whatever the axes do.

@@ -13,6 +13,9 @@ pub struct Unexplained {
     pub rms_m: f64,
     /// The place that it fits best.
     pub at: String,
+    /// Another joint whose position it goes with, where one does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goes_with: Option<String>,
     /// Recordings and times of it.
     pub r#where: Vec<Where>,
     /// Stretches of travel in which it gathers, the most telling first; none where it is everywhere alike.

@@ -49,7 +49,8 @@ impl Search<'_> {
                 break;
             };
             let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
-            let weight = next.weight;
+            // What a shape of its own would lend it is what the next name takes.
+            let weight = next.score.evidence + self.priors[next.candidate];
             let Some(entered) = self.enter(next, &space) else { break };
             names.push(Active { near, ..entered });
             sum += weight;

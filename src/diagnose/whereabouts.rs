@@ -15,6 +15,7 @@ use super::score::{Column, Rows, judge};
 use super::search::Search;
 use super::shape::{EARLY, UNKNOWN};
 use super::space::Space;
+use super::sums::sums;
 use crate::effects::{Place, Slot};
 use crate::elementary::sines_cosines;
 use crate::feature::{JointSamples, Samples};
@@ -39,11 +40,13 @@ const FORETOLD: f64 = 0.1;
 const IN_QUESTION: f64 = 0.97;
 
 /// A way in which a place can move.
-type Motion = (Slot, Twist<f64>);
+pub(super) type Motion = (Slot, Twist<f64>);
 
 /// Motions at one place, times one series of curves.
-struct Series {
-    place: Place,
+pub(super) struct Series {
+    pub place: Place,
+    /// Another joint whose position it goes with.
+    with: Option<usize>,
     motions: Vec<Motion>,
     curves: Vec<Vec<f64>>,
     /// Whether the curves jump, which blocks of samples might hide.
@@ -54,24 +57,28 @@ struct Series {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
     pub place: Place,
+    /// Another joint whose position it goes with.
+    pub with: Option<usize>,
     /// Logarithm of its evidence.
     pub evidence: f64,
     /// Half the energy that it takes away.
     pub gain: f64,
 }
 
-/// The place that most of what geometry leaves over depends on.
-pub(super) fn whereabouts(search: &Search, machine: &Machine) -> Place {
+/// The place that most of what geometry leaves over depends on, and another joint whose position it goes with.
+pub(super) fn whereabouts(search: &Search, machine: &Machine) -> (Place, Option<usize>) {
     let series = standing(search, machine, search.base.clone());
     let rivals = search.rivals(&[]);
     let named = rivals.first().map(|r| Standing {
         place: search.candidates[r.candidate].place,
+        with: None,
         evidence: r.weight,
         gain: r.reach,
     });
     let best = series.into_iter().chain(named).max_by(|a, b| a.evidence.total_cmp(&b.evidence));
     let energy = search.leftover(&search.base).energy;
-    best.filter(|best| 2.0 * best.gain > FORETOLD * energy).map_or(Place::Measurement, |best| best.place)
+    best.filter(|best| 2.0 * best.gain > FORETOLD * energy)
+        .map_or((Place::Measurement, None), |best| (best.place, best.with))
 }
 
 /// The series of most evidence beside a space.
@@ -89,13 +96,14 @@ pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Opti
         let columns = level.map_or_else(|| series.columns(rows), |level| series.on_blocks(rows, level));
         let mut standing = None;
         let count = columns.ncols();
-        judge(&columns.columns(0, count), space, left, &[0], &mut |_, gram, g| {
-            let Worth { evidence, gain, .. } = evidence(gram, g, count, heat, 0);
-            standing = Some(Standing { place: series.place, evidence, gain });
+        judge(&columns.columns(0, count), space, left, &[0], &mut |_, equations| {
+            let Worth { evidence, gain, .. } = evidence(&equations.gram, &equations.toward, count, heat, 0);
+            standing = Some(series.standing(evidence, gain));
         });
         standing
     };
-    let all = all(search, machine);
+    let courses = courses(search, machine);
+    let all = all(search, &courses);
     let coarse = |series: &Series| {
         let level = series.level(rows);
         one(series, level).map(|standing| (standing, level.is_some()))
@@ -106,11 +114,21 @@ pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Opti
         let (standing, on_blocks) = (*judged)?;
         if on_blocks && standing.gain > IN_QUESTION * most { one(series, None) } else { Some(standing) }
     };
-    let settled: Vec<Standing> = all.par_iter().zip(&judged).filter_map(fine).collect();
+    let mut settled: Vec<Standing> = all.par_iter().zip(&judged).filter_map(fine).collect();
+    settled.extend(sums(rows, &field, &courses, heat));
     settled.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 
 impl Series {
+    /// Of a joint that goes with another one, without blocks.
+    pub fn of(joint: usize, with: usize, motions: Vec<Motion>, curves: Vec<Vec<f64>>) -> Self {
+        Series { place: Place::Joint(joint), with: Some(with), motions, curves, jumps: true }
+    }
+
+    pub fn standing(&self, evidence: f64, gain: f64) -> Standing {
+        Standing { place: self.place, with: self.with, evidence, gain }
+    }
+
     /// The level on whose blocks its curves change little, the longest first.
     fn level(&self, rows: &Rows) -> Option<usize> {
         let follows = |level: &Level| self.curves.iter().all(|curve| level.follows(curve));
@@ -119,7 +137,7 @@ impl Series {
     }
 
     /// One whitened column for each motion and curve, times the size usual on machines.
-    fn columns(&self, rows: &Rows) -> DMatrix<f64> {
+    pub fn columns(&self, rows: &Rows) -> DMatrix<f64> {
         let answers = self.motions.iter().map(|(slot, direction)| rows.answer(*slot, *direction));
         let mut columns = self.products(answers.collect(), &self.curves, &rows.linear.sample);
         rows.whiten(&mut columns);
@@ -151,18 +169,21 @@ impl Series {
     }
 }
 
-/// Every series of every place.
-fn all(search: &Search, machine: &Machine) -> Vec<Series> {
+/// The ways of all joints that move.
+fn courses<'a>(search: &Search<'a>, machine: &Machine) -> Vec<Course<'a>> {
     let samples = &search.rows.linear.samples;
-    let courses: Vec<Course> =
-        machine.joints().filter_map(|(j, joint)| Course::of(samples, j, joint)).collect();
+    machine.joints().filter_map(|(j, joint)| Course::of(samples, j, joint)).collect()
+}
+
+/// Every series of every place.
+fn all(search: &Search, courses: &[Course]) -> Vec<Series> {
     let mut all: Vec<Series> = courses.iter().flat_map(Course::series).collect();
-    for one in &courses {
+    for one in courses {
         for other in courses.iter().filter(|other| other.joint != one.joint) {
             let (own, others) = (one.crossing(), other.crossing());
             let curves = own.iter().flat_map(|a| others.iter().map(|b| product(a, b))).collect();
             let (place, motions) = (Place::Joint(one.joint), vec![one.own()]);
-            all.push(Series { place, motions, curves, jumps: false });
+            all.push(Series { place, with: Some(other.joint), motions, curves, jumps: false });
         }
     }
     all.extend(over_time(search));
@@ -170,12 +191,12 @@ fn all(search: &Search, machine: &Machine) -> Vec<Series> {
 }
 
 /// The way of one joint through all recordings.
-struct Course<'a> {
-    joint: usize,
+pub(super) struct Course<'a> {
+    pub joint: usize,
     kind: JointKind,
     twist: Twist<f64>,
     /// Where it stands, over the range that it goes, from 0 to 1.
-    along: Vec<f64>,
+    pub along: Vec<f64>,
     range: f64,
     samples: &'a [Samples],
 }
@@ -195,8 +216,14 @@ impl<'a> Course<'a> {
     }
 
     /// Its own motion.
-    fn own(&self) -> Motion {
+    pub fn own(&self) -> Motion {
         (Slot::Before(self.joint), self.twist)
+    }
+
+    /// Translations of the frame that it stands on.
+    pub fn translations(&self) -> Vec<Motion> {
+        let unit = |k: usize| Twist::from_array(std::array::from_fn(|i| f64::from(u8::from(i == k))));
+        (0..3).map(|k| (Slot::Before(self.joint), unit(k))).collect()
     }
 
     /// What may depend on another joint as well: slow waves of where it stands, and its sine and cosine, as weights on a rotary joint have them.
@@ -295,7 +322,7 @@ impl<'a> Course<'a> {
         ];
         let place = Place::Joint(self.joint);
         let all = all.into_iter().filter(|(_, curves, _)| !curves.is_empty());
-        all.map(|(motions, curves, jumps)| Series { place, motions, curves, jumps }).collect()
+        all.map(|(motions, curves, jumps)| Series { place, with: None, motions, curves, jumps }).collect()
     }
 }
 
@@ -308,7 +335,13 @@ fn over_time(search: &Search) -> Vec<Series> {
     for candidate in search.candidates.iter().filter(|c| is_still(c.place)) {
         let at = all.iter().position(|series| series.place == candidate.place).unwrap_or_else(|| {
             let curves = smooth(&clock);
-            all.push(Series { place: candidate.place, motions: Vec::new(), curves, jumps: false });
+            all.push(Series {
+                place: candidate.place,
+                with: None,
+                motions: Vec::new(),
+                curves,
+                jumps: false,
+            });
             all.len() - 1
         });
         for part in candidate.coefficients.iter().flat_map(|c| &c.parts) {
