@@ -44,6 +44,9 @@ struct Arguments {
     /// With `--judge`: diagnoses cases of a single effect with its family left out of the library.
     #[arg(long)]
     left_out: bool,
+    /// Machines of this folder (*.ron) in place of those shipped.
+    #[arg(long, value_name = "DIR")]
+    machines: Option<PathBuf>,
     /// Textbook shapes and white noise, or neither.
     #[arg(long, value_enum, default_value = "standard")]
     kind: Kinds,
@@ -103,19 +106,21 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         Modes::Two => Mode::Two,
         Modes::Odd => Mode::Odd,
     });
+    let machines = machine_folder(arguments);
     if let Some(folder) = &arguments.write {
-        harness::write(folder, kind, mode, arguments.seed, arguments.count)?;
+        let all = harness::machines_in(&machines)?;
+        harness::write(folder, &all, kind, mode, arguments.seed, arguments.count)?;
     }
     if let Some(folder) = arguments.judge.as_ref().filter(|_| arguments.left_out) {
-        let said = harness::left_out::judge(folder, &engine(arguments)?, &harness::machine_folder())?;
+        let said = harness::left_out::judge(folder, &engine(arguments)?, &machines)?;
         said.broken.iter().chain(&said.told).for_each(|line| println!("{line}"));
         println!("\n{}", table::left_out(&said));
     } else if let Some(folder) = &arguments.judge {
         let score = match arguments.baseline {
-            Some(Baselines::Ranked) => harness::judge(folder, &Baseline::Ranked)?,
-            Some(Baselines::Stepwise) => harness::judge(folder, &Baseline::Stepwise)?,
-            Some(Baselines::Lasso) => harness::judge(folder, &Baseline::Lasso)?,
-            None => harness::judge(folder, &engine(arguments)?)?,
+            Some(Baselines::Ranked) => harness::judge(folder, &machines, &Baseline::Ranked)?,
+            Some(Baselines::Stepwise) => harness::judge(folder, &machines, &Baseline::Stepwise)?,
+            Some(Baselines::Lasso) => harness::judge(folder, &machines, &Baseline::Lasso)?,
+            None => harness::judge(folder, &machines, &engine(arguments)?)?,
         };
         println!("{}", table::terminal(&score, kind));
     }
@@ -127,6 +132,10 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         return Err("nothing to do: give --write DIR, --judge DIR or --report FILE".into());
     }
     Ok(())
+}
+
+fn machine_folder(arguments: &Arguments) -> PathBuf {
+    arguments.machines.clone().unwrap_or_else(harness::machine_folder)
 }
 
 fn engine(arguments: &Arguments) -> Result<Engine, String> {
@@ -172,24 +181,32 @@ fn report(arguments: &Arguments) -> Result<String, String> {
         out,
         "Written by `cargo run --release --example blind -- --report docs/diagnosis.md --count {count} --seed {seed}`.\n"
     );
-    let made = both(&folder, &engine, count, seed, &mut out);
+    let made = both(&folder, &machine_folder(arguments), &engine, count, seed, &mut out);
     let _ = std::fs::remove_dir_all(&folder);
     made.map(|()| out)
 }
 
-fn both(folder: &Path, engine: &Engine, count: usize, seed: u64, out: &mut String) -> Result<(), String> {
+fn both(
+    folder: &Path,
+    machines: &Path,
+    engine: &Engine,
+    count: usize,
+    seed: u64,
+    out: &mut String,
+) -> Result<(), String> {
+    let all = harness::machines_in(machines)?;
     for (kind, word) in [(Kind::Standard, "standard"), (Kind::Hard, "hard")] {
         let own = folder.join(word);
-        harness::write(&own, kind, None, seed, count)?;
-        let score = harness::judge(&own, engine)?;
+        harness::write(&own, &all, kind, None, seed, count)?;
+        let score = harness::judge(&own, machines, engine)?;
         let _ = writeln!(out, "### {word}: {} cases\n\n{}", score.cases, table::markdown(&score, kind));
         let _ = writeln!(out, "{}\n{}", table::confusion(&score), table::calibration(&score));
-        let left_out = harness::left_out::judge(&own, engine, &harness::machine_folder())?;
+        let left_out = harness::left_out::judge(&own, engine, machines)?;
         let _ = writeln!(out, "{}", table::left_out(&left_out));
         let methods = [Baseline::Ranked, Baseline::Stepwise, Baseline::Lasso];
         let mut others = Vec::new();
         for method in methods {
-            others.push((method.name(), harness::judge(&own, &method)?));
+            others.push((method.name(), harness::judge(&own, machines, &method)?));
         }
         let _ = writeln!(
             out,

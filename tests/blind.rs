@@ -232,7 +232,7 @@ fn the_engine_names_what_a_few_blind_cases_conceal() {
     let text = serde_json::to_string(&answers).expect("JSON");
     std::fs::write(folder.join("answers.json"), text).expect("written");
     let engine = Engine::new(PathBuf::from(env!("CARGO_BIN_EXE_kincal")));
-    let score = harness::judge(&folder, &engine).expect("readable");
+    let score = harness::judge(&folder, &harness::machine_folder(), &engine).expect("readable");
     println!("{}", harness::table::terminal(&score, Kind::Standard));
     assert!(score.broken.is_empty(), "{:?}", score.broken);
     // Reached: 6 of 6, 1.0, 2 of 2, 0; 1 of 2 odd ones unexplained and the other given wrong names; 1 of 12 worse on the judge's path.
@@ -248,4 +248,51 @@ fn the_engine_names_what_a_few_blind_cases_conceal() {
     assert!(all.broken.is_empty(), "{:?}", all.broken);
     assert!(2 * all.unexplained.hits >= all.unexplained.of, "{:?}", all.told);
     assert!(2 * all.at_its_place.hits >= all.at_its_place.of, "{:?}", all.told);
+}
+
+/// Standard cases of one effect with fewer than 2000 samples among the first 40 of seed 3, on machines that are shipped nowhere.
+const ELSEWHERE: [usize; 4] = [3, 13, 26, 35];
+
+#[test]
+fn machines_that_nobody_ships_are_diagnosed_as_those_that_are() {
+    let folder = folder("elsewhere");
+    let unseen = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/blind/machines");
+    let machines = harness::machines_in(&unseen).expect("readable");
+    let shipped = harness::machines();
+    assert!(machines.iter().all(|m| shipped.iter().all(|other| other.name() != m.name())));
+    let write = |number: &usize| {
+        draw(&machines, Kind::Standard, Some(Mode::One), 3, *number).write(&folder).expect("written")
+    };
+    let answers: Vec<_> = ELSEWHERE.iter().map(write).collect();
+    let text = serde_json::to_string(&answers).expect("JSON");
+    std::fs::write(folder.join("answers.json"), text).expect("written");
+    let engine = Engine::new(PathBuf::from(env!("CARGO_BIN_EXE_kincal")));
+    let score = harness::judge(&folder, &unseen, &engine).expect("readable");
+    assert!(score.broken.is_empty(), "{:?}", score.broken);
+    assert_eq!(score.first, Count { hits: 4, of: 4 }, "{:?}", score.failures);
+    assert_eq!(score.needless_one, 0, "{:?}", score.failures);
+}
+
+/// Arms at settled positions, hard cases of these seeds: waves along the sum of two joints, of 0.6 and 3.5 times the noise, and a product of two
+/// joints' curves of half of it.
+const TOGETHER: [(u64, usize); 3] = [(30, 50), (33, 79), (33, 47)];
+
+#[test]
+fn what_goes_with_two_joints_together_is_no_noise_of_settled_positions() {
+    let folder = folder("together");
+    let machines = harness::machines();
+    let write = |(number, (seed, of)): (usize, &(u64, usize))| {
+        let mut case = draw(&machines, Kind::Hard, None, *seed, *of);
+        assert_eq!((case.mode, case.world.runs[0].settled), (Mode::Odd, true));
+        case.number = number;
+        case.write(&folder).expect("written")
+    };
+    let answers: Vec<_> = TOGETHER.iter().enumerate().map(write).collect();
+    let text = serde_json::to_string(&answers).expect("JSON");
+    std::fs::write(folder.join("answers.json"), text).expect("written");
+    let engine = Engine::new(PathBuf::from(env!("CARGO_BIN_EXE_kincal")));
+    let score = harness::judge(&folder, &harness::machine_folder(), &engine).expect("readable");
+    assert!(score.broken.is_empty(), "{:?}", score.broken);
+    assert_eq!(score.odd_unexplained, Count { hits: 3, of: 3 }, "{:?}", score.failures);
+    assert_eq!(score.odd_at_right_place, Count { hits: 3, of: 3 }, "{:?}", score.failures);
 }
