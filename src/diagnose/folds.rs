@@ -196,6 +196,11 @@ pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Act
     kept
 }
 
+/// Whether effects make the mean square of stretches that were left out so many times that of geometry alone.
+pub(super) fn worsen(search: &Search, active: &[Active], factor: f64) -> bool {
+    Folds::new(search, active).is_some_and(|folds| folds.without_all(search) > factor)
+}
+
 /// Normal equations of all samples and of each fold.
 struct Folds {
     /// Columns as they are, m and rad.

@@ -11,8 +11,8 @@ const AHEAD: f64 = 5.0;
 /// A name at the place says all that is there, but for its shape, if it takes away at least this part of what the series do.
 const SAYS_ALL: f64 = 0.9;
 
-/// The place whose series (69) say more than several names do together, as likely as not with the freedom of their shapes; and the name there
-/// that has nearly all of it, if there is one: then the others were pieces of its shape.
+/// The place whose series (69) say more than several names do together, with all the freedom of their shapes; and the name there that
+/// has nearly all of it, if there is one: then the others were pieces of its shape.
 ///
 /// Two effects are told apart because neither a place nor a shape takes both. Pieces of which each takes a part of one thing fall behind
 /// a series that takes all of it, though that has ten times their number of coefficients. Settled positions show no course, and several
@@ -26,8 +26,14 @@ pub(super) fn outbid(
         return None;
     }
     let rare: f64 = active.iter().map(|effect| search.priors[effect.candidate]).sum();
-    let plain: Vec<Active> = active.iter().map(Active::without_shape).collect();
-    let names = log_mean_exp(&[search.worth(active), search.worth(&plain)]) + rare;
+    // Orders of one error motion are each other's shape.
+    let are_one = active[1..].iter().all(|effect| search.is_one(active[0].candidate, effect.candidate));
+    let names = if are_one {
+        let plain: Vec<Active> = active.iter().map(Active::without_shape).collect();
+        log_mean_exp(&[search.worth(active), search.worth(&plain)]) + rare
+    } else {
+        search.worth(active) + rare
+    };
     let series = standing(search, machine, search.base.clone())?;
     let says_all = |i: &usize| {
         let effect = &active[*i..=*i];

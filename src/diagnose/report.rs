@@ -32,6 +32,8 @@ const TOLERATED: f64 = 0.2;
 /// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
 /// leaves fewer independent readings.
 const SURPRISE: f64 = 0.003;
+/// Several names that make the mean square of stretches left out so many times that of geometry alone are a patchwork.
+const WORSE: f64 = 2.0;
 /// More events of one moment each in one session are no slips: something is loose, or the instrument jumps to and fro.
 const EVENTS: usize = 2;
 /// Structure counts beyond this many standard deviations of chance.
@@ -202,6 +204,7 @@ fn doubt(
         || left.beyond > CHANCE && search.in_motion && active.len() >= search.most()
         || active.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
         || shares.is_misshapen(active.len())
+        || search.in_motion && active.len() > 1 && folds::worsen(search, active, WORSE)
         || search.in_motion && !wanders && shares.is_unlike()
         || shares.shapes > ODD_SHAPE * total
             && surprise > CHANCE * left.heat.max(1.0) * deviation
