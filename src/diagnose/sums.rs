@@ -26,57 +26,71 @@ type Wave = [Vec<f64>; 2];
 
 /// The place and the wave along the sum of its joint's position and another one's that have the most evidence.
 pub(super) fn sums(rows: &Rows, field: &Field, courses: &[Course], heat: f64) -> Option<Standing> {
-    let blocks = Blocks::new(rows);
-    let waves: Vec<Vec<Wave>> =
-        courses.iter().map(|course| waves(&blocks.in_middles(&course.along))).collect();
-    let pairs: Vec<(usize, usize)> = (0..courses.len())
-        .flat_map(|a| (0..courses.len()).filter(move |b| a != *b).map(move |b| (a, b)))
-        .collect();
-    let back = rows.whitener.transposed(field.left.as_slice());
-    let of_pair = |(a, b): &(usize, usize)| {
-        let motions = [vec![courses[*a].own()], courses[*a].translations()];
-        let screens = motions.map(|motions| (blocks.screens(rows, &motions, &back), motions));
-        let mut all: Vec<Sum> = Vec::new();
-        for (i, first) in waves[*a].iter().enumerate() {
-            for (j, second) in waves[*b].iter().enumerate() {
-                for sign in [1.0, -1.0] {
-                    let wave = joined(first, second, sign);
-                    let number = [i, j].map(|k| FEWEST + k as f64 * APART);
-                    all.extend(screens.iter().enumerate().map(|(kind, (screens, motions))| Sum {
-                        of: [*a, *b],
-                        kind,
-                        waves: [number[0], sign * number[1]],
-                        rough: screens.iter().map(|s| s.energy(&wave)).sum::<f64>()
-                            - 2.0 * motions.len() as f64,
-                    }));
-                }
-            }
-        }
-        all.sort_by(|x, y| y.rough.total_cmp(&x.rough));
-        let count = all.len();
-        all.truncate(LOOKED_AT);
-        (all, count)
-    };
-    let found: Vec<(Vec<Sum>, usize)> = pairs.par_iter().map(of_pair).collect();
-    let tried = (found.iter().map(|(_, count)| count).sum::<usize>().max(1) as f64).ln();
-    let mut best: Vec<Sum> = found.into_iter().flat_map(|(best, _)| best).collect();
-    best.sort_by(|x, y| y.rough.total_cmp(&x.rough));
-    let judged = |sum: &Sum| sum.judged(rows, field, courses, heat);
+    let (best, tried) = screened(rows, field, courses);
+    let judged = |sum: Sum| Some((sum, sum.judged(rows, field, courses, heat)?));
     let better = |x: &(Sum, Standing), y: &(Sum, Standing)| x.1.evidence.total_cmp(&y.1.evidence);
-    let looked_at = best.into_iter().take(LOOKED_AT).filter_map(|sum| judged(&sum).map(|of| (sum, of)));
-    let (mut sum, mut standing) = looked_at.max_by(better)?;
+    let (mut sum, mut standing) = best.into_iter().filter_map(judged).max_by(better)?;
     // Between the numbers that were tried it may be better.
     let mut apart = 0.5 * APART;
     while apart > FINE {
         let around = [[apart, 0.0], [-apart, 0.0], [0.0, apart], [0.0, -apart]];
-        let moved = around.iter().map(|by| Sum { waves: [0, 1].map(|k| sum.waves[k] + by[k]), ..sum });
-        let best = moved.filter_map(|sum| judged(&sum).map(|of| (sum, of))).max_by(better);
+        let moved = around.map(|by| Sum { waves: [0, 1].map(|k| sum.waves[k] + by[k]), ..sum });
+        let best = moved.into_iter().filter_map(judged).max_by(better);
         match best.filter(|(_, of)| of.evidence > standing.evidence) {
             Some(moved) => (sum, standing) = moved,
             None => apart *= 0.5,
         }
     }
-    Some(Standing { evidence: standing.evidence - tried, ..standing })
+    Some(Standing { evidence: standing.evidence - (tried as f64).ln(), ..standing })
+}
+
+/// The sums that seem to take away most, the best first, on blocks of samples and as if nothing were known besides; and how many were tried.
+fn screened(rows: &Rows, field: &Field, courses: &[Course]) -> (Vec<Sum>, usize) {
+    let blocks = Blocks::new(rows);
+    let waves: Vec<Vec<Wave>> =
+        courses.iter().map(|course| waves(&blocks.in_middles(&course.along))).collect();
+    let back = rows.whitener.transposed(field.left.as_slice());
+    let of_pair = |of: [usize; 2]| {
+        let places = [false, true].map(|translates| {
+            let motions = motions(&courses[of[0]], translates);
+            (translates, blocks.screens(rows, &motions, &back))
+        });
+        let mut all: Vec<Sum> = Vec::new();
+        for (i, first) in waves[of[0]].iter().enumerate() {
+            for (j, second) in waves[of[1]].iter().enumerate() {
+                for sign in [1.0, -1.0] {
+                    let wave = joined(first, second, sign);
+                    let [one, other] = [i, j].map(|k| FEWEST + k as f64 * APART);
+                    all.extend(places.iter().map(|(translates, screens)| Sum {
+                        of,
+                        translates: *translates,
+                        waves: [one, sign * other],
+                        rough: screens.iter().map(|screen| screen.energy(&wave) - 2.0).sum(),
+                    }));
+                }
+            }
+        }
+        let tried = all.len();
+        (best_of(all), tried)
+    };
+    let pairs = (0..courses.len())
+        .flat_map(|a| (0..courses.len()).filter(move |b| a != *b).map(move |b| [a, b]))
+        .collect::<Vec<_>>();
+    let found: Vec<(Vec<Sum>, usize)> = pairs.into_par_iter().map(of_pair).collect();
+    let tried = found.iter().map(|(_, tried)| tried).sum();
+    (best_of(found.into_iter().flat_map(|(best, _)| best).collect()), tried)
+}
+
+/// Those that are looked at, the best first.
+fn best_of(mut sums: Vec<Sum>) -> Vec<Sum> {
+    sums.sort_by(|x, y| y.rough.total_cmp(&x.rough));
+    sums.truncate(LOOKED_AT);
+    sums
+}
+
+/// A joint's own motion, or translations of the frame that it stands on.
+fn motions(course: &Course, translates: bool) -> Vec<Motion> {
+    if translates { course.translations() } else { vec![course.own()] }
 }
 
 /// A wave along the sum of two joints' positions.
@@ -84,8 +98,8 @@ pub(super) fn sums(rows: &Rows, field: &Field, courses: &[Course], heat: f64) ->
 struct Sum {
     /// The courses of both; the first one's joint is the place.
     of: [usize; 2],
-    /// The joint's own motion, or translations of its frame.
-    kind: usize,
+    /// Whether the frame that the joint stands on is displaced, and not the joint along its own motion.
+    translates: bool,
     /// How many waves over either one's range.
     waves: [f64; 2],
     /// Energy that it takes away beside nothing, less what chance would.
@@ -93,18 +107,14 @@ struct Sum {
 }
 
 impl Sum {
-    fn motions(&self, courses: &[Course]) -> Vec<Motion> {
-        let course = &courses[self.of[0]];
-        if self.kind == 0 { vec![course.own()] } else { course.translations() }
-    }
-
     /// What it is worth on all rows, beside what is known.
     fn judged(&self, rows: &Rows, field: &Field, courses: &[Course], heat: f64) -> Option<Standing> {
         let [first, second] = self.of.map(|of| &courses[of]);
         let phases =
             first.along.iter().zip(&second.along).map(|(x, y)| self.waves[0] * x + self.waves[1] * y);
         let (sines, cosines) = phases.map(|phase| (TAU * phase).sin_cos()).unzip();
-        let series = Series::of(first.joint, second.joint, self.motions(courses), vec![sines, cosines]);
+        let series =
+            Series::of(first.joint, second.joint, motions(first, self.translates), vec![sines, cosines]);
         let columns = series.columns(rows);
         let (mut standing, count) = (None, columns.ncols());
         judge(&columns.columns(0, count), &field.space, &field.left, &[0], &mut |_, equations| {
