@@ -2,7 +2,8 @@
 
 use super::evidence::log_mean_exp;
 use super::search::{Active, Search};
-use super::whereabouts::{Standing, standing};
+use super::series::Standing;
+use super::whereabouts::standing;
 use crate::machine::Machine;
 
 /// By so much, a logarithm, the place has more evidence than all names together.

@@ -6,9 +6,10 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
+use super::course::Course;
 use super::evidence::{Worth, evidence};
 use super::score::{Field, Rows, judge};
-use super::whereabouts::{Course, Motion, Series, Standing};
+use super::series::{Motion, Series, Standing};
 use crate::identify::Span;
 
 /// Waves over the range of each joint: the fewest, the most, and by how many they are apart.
