@@ -13,6 +13,7 @@ mod companions;
 mod contained;
 mod course;
 mod curves;
+mod detour;
 mod diagnosis;
 mod enter;
 mod evidence;

@@ -136,7 +136,8 @@ impl Case<'_> {
             if round == NOISE_ROUNDS || is_settled(&judged) {
                 let heat = search.leftover(&search.beside(&active, None)).heat;
                 if heat < HOT {
-                    let found = less_rare(&search, search.unfolded(active, most_wild));
+                    let found = search.unfolded(search.or_without_the_first(active), most_wild);
+                    let found = less_rare(&search, found);
                     let active = search.polished(&folds::useful(&search, &found, most_wild));
                     return Ok(report(&search, &active));
                 }

@@ -412,7 +412,7 @@ impl Search<'_> {
 }
 
 /// Columns of all parts.
-fn side_by_side(parts: &[&DMatrix<f64>], rows: usize) -> DMatrix<f64> {
+pub(super) fn side_by_side(parts: &[&DMatrix<f64>], rows: usize) -> DMatrix<f64> {
     let mut joined = DMatrix::zeros(rows, parts.iter().map(|p| p.ncols()).sum());
     let mut at = 0;
     for part in parts {

@@ -9,7 +9,7 @@ use super::curves::{column, product};
 use super::score::Rows;
 use super::search::Active;
 use super::space::gram;
-use crate::effects::{Candidate, Slot};
+use crate::effects::{Candidate, Place, Slot};
 use crate::feature::{Feature, Samples};
 use crate::lie::Twist;
 
@@ -176,6 +176,17 @@ pub(super) fn is_of_curve(curve: &Candidate, other: &Candidate) -> bool {
 /// Whether it is a curve along the travel of a joint, of so many coefficients.
 pub(super) fn is_curve(candidate: &Candidate) -> bool {
     candidate.parameters.is_empty() && is_along_travel(candidate) && candidate.coefficients.len() >= BENDS
+}
+
+/// Whether it is a curve over time of what is read, of so many coefficients.
+pub(super) fn is_drift(candidate: &Candidate) -> bool {
+    let by_clock = |f: &Feature| {
+        f.needs_moment() && f.joints().is_empty() && f.channels().is_empty() && f.wave().is_none()
+    };
+    candidate.place == Place::Measurement
+        && candidate.parameters.is_empty()
+        && candidate.features.len() >= BENDS
+        && candidate.features.iter().all(by_clock)
 }
 
 /// Whether it depends on where one joint stands and on nothing else, and is no wave.

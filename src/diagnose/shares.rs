@@ -1,7 +1,9 @@
 //! What belongs to the shape of the effects that were found, and what is an effect of its own.
 
+use nalgebra::DMatrix;
+
 use super::leftover::Leftover;
-use super::search::{Active, Rival, Search};
+use super::search::{Active, Rival, Search, side_by_side};
 use super::shape;
 use super::space::Space;
 use crate::effects::Place;
@@ -27,6 +29,8 @@ const SHAPE: f64 = 0.35;
 /// standard deviations of chance.
 const UNLIKE: f64 = 0.1;
 const CHANCE: f64 = 3.0;
+/// What leaves this part of all beside curves over time jumps.
+const JUMPS: f64 = 0.02;
 
 /// Frequencies nearer than so many turns in the time seen belong to one line.
 const NEAR: f64 = 32.0;
@@ -44,6 +48,8 @@ pub(super) struct Shares {
     pub shapes: f64,
     /// With nothing.
     pub left: Leftover,
+    /// What of the shapes is the course of a drift that may take any.
+    free: f64,
     /// How many parameters the shapes have.
     freedom: f64,
 }
@@ -60,9 +66,11 @@ impl Shares {
         self.shapes > SHAPE * self.total() / (several as f64).sqrt()
     }
 
-    /// Whether the shapes depart farther from the families' than those of a right name do.
+    /// Whether the shapes depart farther from the families' than those of a right name do. No law says what course an instrument's drift
+    /// takes, but it is smooth: its shape leaves next to nothing.
     pub fn is_unlike(&self) -> bool {
-        self.shapes > UNLIKE * self.total() + CHANCE * self.left.heat * (2.0 * self.freedom).sqrt()
+        let free = if self.left.energy < JUMPS * self.total() { self.free } else { 0.0 };
+        self.shapes - free > UNLIKE * self.total() + CHANCE * self.left.heat * (2.0 * self.freedom).sqrt()
     }
 }
 
@@ -74,9 +82,16 @@ impl Search<'_> {
         let taken = |from: &Space, to: &Space| {
             (energy(from) - energy(to) - (to.parameters() - from.parameters())).max(0.0)
         };
+        let drifts = active.iter().filter(|effect| shape::is_drift(&self.candidates[effect.candidate]));
+        let courses: Vec<&DMatrix<f64>> = drifts.map(|effect| &effect.shape).collect();
+        let free = match courses.is_empty() {
+            true => 0.0,
+            false => taken(&names, &names.with(&side_by_side(&courses, self.rows.residual.len()))),
+        };
         Shares {
             names: taken(&self.base, &names),
             shapes: taken(&names, &full),
+            free,
             left: self.leftover(&full),
             freedom: full.parameters() - names.parameters(),
         }

@@ -1,0 +1,51 @@
+//! Another way to the same recordings: without the effect that came first, `docs/diagnosis.md` (79).
+
+use std::cell::RefCell;
+
+use super::search::{Active, ENTER, Search};
+
+/// Logarithm of what is expected of a candidate that has to stand aside.
+const ASIDE: f64 = -1e9;
+
+impl Search<'_> {
+    /// These effects, or others that say more without the largest of them.
+    ///
+    /// What comes first takes the most by itself, and may do so because two others are there: weight on a tilted axis is nearly an eccentric
+    /// encoder there and a wobble of the next axis. Swaps one by one do not find the two. It shows where shapes take up more than the least
+    /// of the names.
+    pub fn or_without_the_first(&self, active: Vec<Active>) -> Vec<Active> {
+        let largest = active.iter().max_by(|a, b| a.score.gain.total_cmp(&b.score.gain));
+        let least = active.iter().map(|effect| effect.score.gain).fold(f64::INFINITY, f64::min);
+        let Some(largest) = largest.filter(|_| self.in_motion && (2..self.most()).contains(&active.len()))
+        else {
+            return active;
+        };
+        if self.shares(&active).shapes < 2.0 * least {
+            return active;
+        }
+        let is_aside = |candidate: usize| self.is_form(candidate, largest.candidate);
+        let prior = |(candidate, prior): (usize, &f64)| if is_aside(candidate) { ASIDE } else { *prior };
+        let search = Search {
+            base: self.base.clone(),
+            priors: self.priors.iter().enumerate().map(prior).collect(),
+            commonness: self.commonness.clone(),
+            known: RefCell::default(),
+            grounds: RefCell::default(),
+            ..*self
+        };
+        let mut others = search.run(&[], |_| true);
+        let says_more = others.len() <= active.len()
+            && self.worth(&others) > self.worth(&active) + ENTER
+            && self.worth_plainly(&others) > self.worth_plainly(&active) + ENTER;
+        if !says_more {
+            return active;
+        }
+        others.iter_mut().for_each(|effect| effect.near.push(largest.candidate));
+        others
+    }
+
+    /// Logarithm of the evidence of all active effects together, their shapes the families'.
+    fn worth_plainly(&self, active: &[Active]) -> f64 {
+        self.worth(&active.iter().map(Active::without_shape).collect::<Vec<_>>())
+    }
+}
