@@ -40,7 +40,10 @@ impl Search<'_> {
         if !says_more {
             return active;
         }
-        others.iter_mut().for_each(|effect| effect.near.push(largest.candidate));
+        // What stood aside may take its place again, as any rival may; nobody competes twice.
+        for effect in others.iter_mut().filter(|effect| !effect.near.contains(&largest.candidate)) {
+            effect.near.push(largest.candidate);
+        }
         others
     }
 
