@@ -183,24 +183,45 @@ impl<W: Write> Write for Watched<W> {
     }
 }
 
-/// Writes a file whole or not at all: into a neighbour first, then renamed.
+/// Writes through `out`, and tells an error of the output as such.
+fn write_into(
+    file: std::fs::File,
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> kincal::Result<()>,
+) -> Outcome {
+    let inner = std::io::BufWriter::with_capacity(1 << 18, file);
+    let mut out = Watched { inner, failed: None };
+    let written = write(&mut out);
+    if let Some(source) = out.failed.take() {
+        return Err(not_written(path, &source));
+    }
+    written?;
+    out.flush().map_err(|source| not_written(path, &source))
+}
+
+/// Writes a file whole or not at all: into a neighbour first, then renamed. A link stays a link, and its file is
+/// replaced; what is no file (a pipe, `/dev/null`) is written to as it is, since a file in its place would end it.
 pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> kincal::Result<()>) -> Outcome {
     let failed = |source: std::io::Error| not_written(path, &source);
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    let known = std::fs::metadata(path).ok();
+    if known.as_ref().is_some_and(|it| !it.is_file() && !it.is_dir()) {
+        let file = std::fs::OpenOptions::new().write(true).open(path).map_err(failed)?;
+        return write_into(file, path, write);
+    }
+    let target = match &known {
+        Some(_) => path.canonicalize().map_err(failed)?,
+        None => path.to_path_buf(),
+    };
+    let mut name = target.file_name().unwrap_or_default().to_os_string();
     name.push(format!(".part{}", std::process::id()));
-    let part = path.with_file_name(name);
+    let part = target.with_file_name(name);
     let result = (|| {
         let file = std::fs::File::create(&part).map_err(failed)?;
-        let inner = std::io::BufWriter::with_capacity(1 << 18, file);
-        let mut out = Watched { inner, failed: None };
-        let written = write(&mut out);
-        if let Some(source) = out.failed.take() {
-            return Err(failed(source));
+        if let Some(known) = &known {
+            file.set_permissions(known.permissions()).map_err(failed)?;
         }
-        written?;
-        out.flush().map_err(failed)?;
-        drop(out);
-        std::fs::rename(&part, path).map_err(failed)
+        write_into(file, path, write)?;
+        std::fs::rename(&part, &target).map_err(failed)
     })();
     if result.is_err() {
         let _ = std::fs::remove_file(&part);

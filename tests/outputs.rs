@@ -1,0 +1,66 @@
+//! What a command leaves where its output is named: a whole file, and never a file in the place of something else.
+#![cfg(unix)]
+
+use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("kincal-outputs-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("a folder");
+        Folder(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A recording of random poses, written to `output`.
+fn simulating(output: &Path) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
+    command.args(["simulate", "machines/scara.ron", "--test", "poses", "--random", "1", "-o"]).arg(output);
+    command
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it runs")
+}
+
+fn simulated(output: &Path) {
+    let done = simulating(output).wait_with_output().expect("it ends");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+}
+
+#[test]
+fn a_pipe_stays_a_pipe_and_is_written_to() {
+    let folder = Folder::new("pipe");
+    let (pipe, plain) = (folder.0.join("pipe"), folder.0.join("plain.csv"));
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo runs").success());
+    simulated(&plain);
+    let writer = simulating(&pipe);
+    let read = std::fs::read(&pipe).expect("read");
+    assert!(writer.wait_with_output().expect("it ends").status.success());
+    assert_eq!(read, std::fs::read(&plain).expect("read"));
+    assert!(std::fs::metadata(&pipe).expect("there").file_type().is_fifo());
+    assert_eq!(std::fs::read_dir(&folder.0).expect("a folder").count(), 2, "nothing else is left behind");
+}
+
+#[test]
+fn a_link_stays_a_link_and_a_file_keeps_who_may_read_it() {
+    let folder = Folder::new("link");
+    let (file, link) = (folder.0.join("file.csv"), folder.0.join("link.csv"));
+    std::fs::write(&file, "old").expect("written");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).expect("set");
+    std::os::unix::fs::symlink("file.csv", &link).expect("linked");
+    simulated(&link);
+    assert!(std::fs::symlink_metadata(&link).expect("there").is_symlink());
+    let there = std::fs::metadata(&file).expect("there");
+    assert!(there.len() > 100 && there.permissions().mode() & 0o777 == 0o600);
+}
