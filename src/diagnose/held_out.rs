@@ -15,8 +15,6 @@ pub(super) struct Model {
     solution: DVector<f64>,
 }
 
-/// Sizes are told as if shapes departed from the families' by this part of what the search allows them, where they seem not to at all.
-const UNKNOWN_SHAPE: f64 = 0.04;
 /// Where a parameter that jumps costs this much, as a logarithm, it is two standard deviations off if it were normal.
 const UNLIKELY: f64 = 2.0;
 /// Halvings on the way there.
@@ -129,8 +127,8 @@ impl Model {
         left.as_slice().to_vec()
     }
 
-    /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together. `shape`: part of the
-    /// amplitudes by which shapes seem to depart from the families'.
+    /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together. `shape`: part of
+    /// what shapes may depart from the families' by which they do.
     pub fn effect(&self, search: &Search, active: &[Active], i: usize, shape: f64) -> Solved {
         let effect = &active[i];
         let candidate = &search.candidates[effect.candidate];
@@ -162,7 +160,7 @@ impl Model {
         for effect in active {
             let at = wide.ncols();
             wide = wide.insert_columns(at, effect.shape.ncols(), 0.0);
-            wide.columns_mut(at, effect.shape.ncols()).copy_from(&(&effect.shape * shape.max(UNKNOWN_SHAPE)));
+            wide.columns_mut(at, effect.shape.ncols()).copy_from(&(&effect.shape * shape));
         }
         let gram = gram(&wide, &wide) + DMatrix::identity(wide.ncols(), wide.ncols());
         let Some(inverse) = gram.try_inverse() else { return Solved { coefficients, covariance } };

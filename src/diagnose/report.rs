@@ -262,7 +262,7 @@ fn finding(
     let probability = alike.sum::<f64>().min(1.0) * trust(shares.shapes / total, 2.0 * own.weight);
     let candidate = &search.candidates[effect.candidate];
     let family = &library.families()[candidate.family];
-    let mut solved = model.effect(search, active, i, (shares.shapes / total).sqrt());
+    let mut solved = model.effect(search, active, i, shares.departure());
     let mut parameters = effect.score.parameters.clone();
     let jumps = |p: &usize| !candidate.parameters[*p].smooth && !candidate.parameters[*p].whole;
     for p in (0..parameters.len()).filter(jumps) {

@@ -25,6 +25,11 @@ const ALL: f64 = 0.9;
 /// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
 const SHAPE: f64 = 0.35;
 
+/// Where nothing tells how far they depart, they are expected to by this part of what the search allows them.
+const UNKNOWN_SHAPE: f64 = 0.04;
+/// Median of what is normal with mean zero and may not be negative, in standard deviations.
+const MEDIAN: f64 = 0.674;
+
 /// Along a path, where everything shows its shape, it is no more than this part in effects that have their right name, and this many
 /// standard deviations of chance.
 const UNLIKE: f64 = 0.1;
@@ -58,6 +63,12 @@ impl Shares {
     /// All of it that stands out from noise.
     pub fn total(&self) -> f64 {
         (self.names + self.shapes + self.left.energy).max(1e-300)
+    }
+
+    /// Part of what shapes may depart from the families' by which they do: what they seem to, or what chance hides of it as likely as not.
+    pub fn departure(&self) -> f64 {
+        let hidden = MEDIAN * self.left.heat * (2.0 * self.freedom).sqrt();
+        (self.shapes / self.total()).sqrt().max((hidden / self.total()).sqrt().min(UNKNOWN_SHAPE))
     }
 
     /// Whether the shapes depart so far from the families' that the names are wrong.
