@@ -15,6 +15,7 @@ mod course;
 mod curves;
 mod detour;
 mod diagnosis;
+mod elsewhere;
 mod enter;
 mod evidence;
 mod finding;

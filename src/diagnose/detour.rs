@@ -34,10 +34,7 @@ impl Search<'_> {
             ..*self
         };
         let mut others = search.run(&[], |_| true);
-        let says_more = others.len() <= active.len()
-            && self.worth(&others) > self.worth(&active) + ENTER
-            && self.worth_plainly(&others) > self.worth_plainly(&active) + ENTER;
-        if !says_more {
+        if others.len() > active.len() || !self.says_more(&others, &active) {
             return active;
         }
         // What stood aside may take its place again, as any rival may; nobody competes twice.
@@ -45,6 +42,12 @@ impl Search<'_> {
             effect.near.push(largest.candidate);
         }
         others
+    }
+
+    /// Whether these effects say more than others, with the freedom of their shapes and without it.
+    pub fn says_more(&self, these: &[Active], than: &[Active]) -> bool {
+        self.worth(these) > self.worth(than) + ENTER
+            && self.worth_plainly(these) > self.worth_plainly(than) + ENTER
     }
 
     /// Logarithm of the evidence of all active effects together, their shapes the families'.

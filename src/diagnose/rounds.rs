@@ -137,7 +137,7 @@ impl Case<'_> {
                 let heat = search.leftover(&search.beside(&active, None)).heat;
                 if heat < HOT {
                     let found = search.unfolded(search.or_without_the_first(active), most_wild);
-                    let found = less_rare(&search, found);
+                    let found = search.moved_together(less_rare(&search, found));
                     let active = search.polished(&folds::useful(&search, &found, most_wild));
                     return Ok(report(&search, &active));
                 }
@@ -145,6 +145,7 @@ impl Case<'_> {
                 let search =
                     Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
                 let found = less_rare(&search, search.unfolded(search.run(&active, |_| true), most_wild));
+                let found = search.moved_together(found);
                 active = search.polished(&folds::useful(&search, &found, most_wild));
                 if moves < MOVES
                     && let Some(late) = late(&search, &active, plain)
