@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use serde_json::Value;
@@ -64,8 +65,11 @@ pub struct Engine {
 }
 
 impl Engine {
+    /// With a folder of its own: several engines of one process, which the tests are, diagnose cases of the same label at once.
     pub fn new(binary: PathBuf) -> Self {
-        let scratch = std::env::temp_dir().join(format!("kincal-blind-{}", std::process::id()));
+        static MADE: AtomicUsize = AtomicUsize::new(0);
+        let number = MADE.fetch_add(1, Ordering::Relaxed);
+        let scratch = std::env::temp_dir().join(format!("kincal-blind-{}-{number}", std::process::id()));
         Engine { binary, scratch, extra: Vec::new(), judged: true }
     }
 
