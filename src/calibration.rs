@@ -8,24 +8,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::chain::Chain;
 use crate::document::Document;
-use crate::error::Result;
-use crate::lie::{Pose, Twist, Vec3};
-use crate::machine::{JointKind, Machine, MachineFault, MachineForm, Placement, at_path, in_unit, to_text};
-
 use crate::effects::StoredEffect;
+use crate::error::Result;
+use crate::error_motion::{self, MotionForm};
+use crate::lie::{Pose, Twist, Vec3};
+use crate::machine::{
+    Checked, JointKind, Machine, MachineFault, MachineForm, OF_CALIBRATION, Placement, Triple, at_path,
+    in_unit, number, to_text, vec_to_si,
+};
+use crate::units::Unit;
+
 use crate::rms::Rms;
 use crate::variation::Variation;
-use error_motions::MotionForm;
 use pieces::{AxisForm, PiecesForm};
 
-mod error_motions;
 mod named;
 mod pieces;
 
 pub use named::LeftOut;
 pub(crate) use named::terms;
-
-pub(crate) type Triple = (f64, f64, f64);
 
 /// The field `calibration` of a machine file, in the file's units.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -274,7 +275,7 @@ impl CalibratedMachine {
     }
 
     fn from_document(document: &Document) -> Result<Self> {
-        let form: MachineForm = document.read()?;
+        let form: MachineForm<CalibrationForm> = document.read()?;
         let machine = Machine::from_form(&form).map_err(|e| at_path(document, e))?;
         let mut calibrated = Self::nominal(machine);
         if let Some(calibration) = &form.calibration {
@@ -283,7 +284,7 @@ impl CalibratedMachine {
         Ok(calibrated)
     }
 
-    fn fill(&mut self, form: &CalibrationForm) -> std::result::Result<(), (String, MachineFault)> {
+    fn fill(&mut self, form: &CalibrationForm) -> Checked<()> {
         let units = self.machine.units();
         self.deviations = deviations(&self.machine, "calibration.deviations", &form.deviations)?;
         let pattern = |(i, pattern): (usize, &Vec<DeviationForm>)| {
@@ -324,7 +325,7 @@ impl CalibratedMachine {
             self.variation = pieces.read(&self.machine)?;
         }
         self.read_effects(form)?;
-        self.variation.motions = error_motions::read(&form.error_motions, &self.machine)?;
+        self.variation.motions = error_motion::read(&form.error_motions, &self.machine)?;
         self.samples = form.samples;
         self.rms = Rms {
             m: form.rms_length.map(|x| units.length.to_si(x)),
@@ -334,7 +335,7 @@ impl CalibratedMachine {
     }
 
     /// The file's unit for what a joint reads; anything that is no joint is a length.
-    fn unit_of(&self, joint: &str) -> crate::units::Unit {
+    fn unit_of(&self, joint: &str) -> Unit {
         let units = self.machine.units();
         match self.machine.joints().find(|(_, j)| j.name == joint) {
             Some((_, joint)) if joint.kind == JointKind::Revolute => units.angle,
@@ -391,7 +392,7 @@ impl CalibratedMachine {
             dead_bands: self.dead_band_forms(),
             clock: self.clock,
             effects: self.effects.clone(),
-            error_motions: error_motions::forms(&self.machine, &self.variation.motions),
+            error_motions: error_motion::forms(&self.machine, &self.variation.motions),
             unseen,
         });
         to_text(&form)
@@ -411,23 +412,8 @@ impl CalibratedMachine {
     }
 }
 
-fn place(
-    path: &str,
-    (x, y, z): Triple,
-    unit: crate::units::Unit,
-) -> std::result::Result<Vec3<f64>, (String, MachineFault)> {
-    for (i, value) in [x, y, z].into_iter().enumerate() {
-        checked(format!("{path}[{i}]"), value)?;
-    }
-    Ok(Vec3([x, y, z].map(|c| unit.to_si(c))))
-}
-
 /// Deviations of every dyad from a list in the file; frames that are not listed have none.
-pub(crate) fn deviations(
-    machine: &Machine,
-    path: &str,
-    forms: &[DeviationForm],
-) -> std::result::Result<Vec<Twist<f64>>, (String, MachineFault)> {
+pub(crate) fn deviations(machine: &Machine, path: &str, forms: &[DeviationForm]) -> Checked<Vec<Twist<f64>>> {
     let units = machine.units();
     let mut deviations = vec![Twist::zero(0.0); machine.dyads().len()];
     for (i, deviation) in forms.iter().enumerate() {
@@ -458,9 +444,10 @@ pub(crate) fn deviation_forms(machine: &Machine, deviations: &[Twist<f64>]) -> V
         .collect()
 }
 
-pub(crate) fn checked(path: String, value: f64) -> std::result::Result<f64, (String, MachineFault)> {
-    if value.is_finite() && value.abs() < 1e9 {
-        return Ok(value);
-    }
-    Err((path, MachineFault::NotFinite { what: "a number of `calibration`".into(), value }))
+fn checked(path: String, value: f64) -> Checked<f64> {
+    number(path, value, OF_CALIBRATION)
+}
+
+fn place(path: &str, triple: Triple, unit: Unit) -> Checked<Vec3<f64>> {
+    vec_to_si(path, triple, unit, OF_CALIBRATION)
 }

@@ -89,7 +89,7 @@ pub(crate) fn named(name: &str) -> String {
 /// aside.
 ///
 /// # Errors
-/// [`Error::Compensate`] with the line that cannot be corrected, [`Error::Nc`], [`Error::File`]; `out` then
+/// [`Error::Input`] with the line that cannot be read or corrected, [`Error::File`]; `out` then
 /// holds a part.
 pub fn compensate(
     calibrated: &CalibratedMachine,

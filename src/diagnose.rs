@@ -23,6 +23,7 @@ mod folds;
 mod held_out;
 mod late;
 mod leftover;
+mod linear;
 mod model;
 mod noise;
 mod not_tried;

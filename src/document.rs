@@ -55,21 +55,21 @@ impl Document {
         let path = path.as_ref();
         let size = std::fs::metadata(path).map_err(|e| Error::file(path, e))?.len();
         if size > MOST_BYTES as u64 {
-            return Err(Error::Ron {
-                place: Place::file(path),
-                message: format!("file has {size} bytes, more than {MOST_BYTES}"),
-                mend: "a machine file takes a few kilobytes; is this the right file?".into(),
-            });
+            return Err(Error::mistake(
+                Place::file(path),
+                format!("file has {size} bytes, more than {MOST_BYTES}"),
+                "a machine file takes a few kilobytes; is this the right file?",
+            ));
         }
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
         let text = String::from_utf8(bytes).map_err(|e| {
             let good = String::from_utf8_lossy(&e.as_bytes()[..e.utf8_error().valid_up_to()]).into_owned();
             let (line, column) = line_and_column(&good, good.len());
-            Error::Ron {
-                place: Place::at(path, line, column),
-                message: "this is not UTF-8 text".into(),
-                mend: "a machine file is plain text in RON; is this the right file?".into(),
-            }
+            Error::mistake(
+                Place::at(path, line, column),
+                "this is not UTF-8 text",
+                "a machine file is plain text in RON; is this the right file?",
+            )
         })?;
         Self::new(path, text)
     }
@@ -81,7 +81,7 @@ impl Document {
     }
 
     fn refuse(&self, place: Place, message: String, mend: &str) -> Error {
-        Error::Ron { place, message, mend: mend.into() }
+        Error::mistake(place, message, mend)
     }
 
     /// The text as a value; a mistake names its line and column.
@@ -94,7 +94,7 @@ impl Document {
                 true => explain(&ron::Error::Eof, self.guide),
                 false => explain(&e.code, self.guide),
             };
-            Error::Ron { place: Place::at(&self.file, start.line, start.col), message, mend }
+            Error::mistake(Place::at(&self.file, start.line, start.col), message, mend)
         })
     }
 

@@ -21,7 +21,7 @@ mod soundness;
 mod wave;
 mod window;
 
-pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Part, Skipped};
+pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Skipped};
 pub use facts::RecordingFacts;
 pub(crate) use facts::by_setup;
 pub use family::{
@@ -29,8 +29,8 @@ pub use family::{
     Seat, Size, Which,
 };
 pub(crate) use grid::NO_TIME;
-pub use identified::{BoundPart, Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
+pub use identified::{Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
 pub use library::Library;
-pub use place::{Place, Slot};
+pub use place::Place;
 pub use quantity::in_words;
 pub use soundness::LibraryFault;

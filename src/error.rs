@@ -3,12 +3,6 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::compensate::CompensateFault;
-use crate::effects::LibraryFault;
-use crate::machine::MachineFault;
-use crate::nc::NcFault;
-use crate::recording::RecordingFault;
-
 /// `Result` with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -48,59 +42,39 @@ impl fmt::Display for Place {
     }
 }
 
+/// What is wrong with something that a user wrote. Every room that reads brings its own faults; [`Error::fault`] finds them again.
+pub trait Fault: std::error::Error + Send + Sync + 'static {
+    /// How to mend it, in one sentence; empty where there is nothing to add.
+    fn mend(&self) -> String;
+}
+
+/// A fault that is told in words alone.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what}")]
+pub struct Mistake {
+    /// What is wrong.
+    pub what: String,
+    /// How to mend it.
+    pub mend: String,
+}
+
+impl Fault for Mistake {
+    fn mend(&self) -> String {
+        self.mend.clone()
+    }
+}
+
 /// Every failure of this crate. The text says where and what; [`Error::mend`] says how to mend it.
 #[non_exhaustive]
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A machine file that cannot stand.
+    /// Something that a user wrote and that cannot stand: a machine, a recording, an NC program, a library of effects.
     #[error("{place}: {fault}")]
-    Machine {
+    Input {
         /// Where in the file.
         place: Place,
         /// What is wrong.
-        fault: MachineFault,
-    },
-    /// A recording that cannot be used.
-    #[error("{place}: {fault}")]
-    Recording {
-        /// Where in the file.
-        place: Place,
-        /// What is wrong.
-        fault: Box<RecordingFault>,
-    },
-    /// An NC program that cannot be read or rewritten.
-    #[error("{place}: {fault}")]
-    Nc {
-        /// Where in the program.
-        place: Place,
-        /// What is wrong.
-        fault: Box<NcFault>,
-    },
-    /// A library of effects that cannot stand.
-    #[error("{place}: {fault}")]
-    Effects {
-        /// Where in the file.
-        place: Place,
-        /// What is wrong.
-        fault: LibraryFault,
-    },
-    /// An NC program that cannot be corrected as it stands.
-    #[error("{place}: {fault}")]
-    Compensate {
-        /// Where in the program.
-        place: Place,
-        /// Why not.
-        fault: Box<CompensateFault>,
-    },
-    /// A text in RON that cannot be read at all.
-    #[error("{place}: {message}")]
-    Ron {
-        /// Where the reader stopped.
-        place: Place,
-        /// What it expected.
-        message: String,
-        /// How to mend it.
-        mend: String,
+        fault: Box<dyn Fault>,
     },
     /// A file that cannot be opened, read or written.
     #[error("{}: {source}", path.display())]
@@ -118,16 +92,6 @@ pub enum Error {
         /// What would help.
         mend: String,
     },
-    /// Faults, an NC program or a table of commands that a simulation cannot use.
-    #[error("{place}: {message}")]
-    Simulation {
-        /// Where in the file.
-        place: Place,
-        /// What is wrong.
-        message: String,
-        /// How to mend it.
-        mend: String,
-    },
     /// A motion that the machine cannot make.
     #[error("{what}")]
     Motion {
@@ -142,15 +106,8 @@ impl Error {
     /// How to mend it, in one sentence; empty where there is nothing to add.
     pub fn mend(&self) -> String {
         match self {
-            Error::Machine { fault, .. } => fault.mend(),
-            Error::Recording { fault, .. } => fault.mend(),
-            Error::Nc { fault, .. } => fault.mend(),
-            Error::Effects { fault, .. } => fault.mend.clone(),
-            Error::Compensate { fault, .. } => fault.mend(),
-            Error::Ron { mend, .. }
-            | Error::Simulation { mend, .. }
-            | Error::Undetermined { mend, .. }
-            | Error::Motion { mend, .. } => mend.clone(),
+            Error::Input { fault, .. } => fault.mend(),
+            Error::Undetermined { mend, .. } | Error::Motion { mend, .. } => mend.clone(),
             Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
                 "check the path; nothing is there".into()
             }
@@ -161,15 +118,36 @@ impl Error {
     /// Where in a user's file, if it is about one.
     pub fn place(&self) -> Option<&Place> {
         match self {
-            Error::Machine { place, .. }
-            | Error::Recording { place, .. }
-            | Error::Nc { place, .. }
-            | Error::Effects { place, .. }
-            | Error::Compensate { place, .. }
-            | Error::Ron { place, .. }
-            | Error::Simulation { place, .. } => Some(place),
+            Error::Input { place, .. } => Some(place),
             Error::File { .. } | Error::Undetermined { .. } | Error::Motion { .. } => None,
         }
+    }
+
+    /// What is wrong with an input, where it is a fault of this kind.
+    ///
+    /// ```
+    /// use kincal::machine::{Machine, MachineFault};
+    ///
+    /// let error = Machine::parse("empty.ron", r#"Machine(
+    ///     name: "empty", units: (length: mm, angle: deg), workpiece: [], tool: [(frame: "t")],
+    /// )"#).unwrap_err();
+    /// assert!(matches!(error.fault(), Some(MachineFault::EmptyBranch { .. })));
+    /// ```
+    pub fn fault<F: Fault>(&self) -> Option<&F> {
+        match self {
+            Error::Input { fault, .. } => (&**fault as &dyn std::error::Error).downcast_ref(),
+            _ => None,
+        }
+    }
+
+    /// Something at fault at a place.
+    pub(crate) fn input(place: Place, fault: impl Fault) -> Self {
+        Error::Input { place, fault: Box::new(fault) }
+    }
+
+    /// The same, told in words alone.
+    pub(crate) fn mistake(place: Place, what: impl Into<String>, mend: impl Into<String>) -> Self {
+        Error::input(place, Mistake { what: what.into(), mend: mend.into() })
     }
 
     pub(crate) fn file(path: impl AsRef<Path>, source: std::io::Error) -> Self {

@@ -1,6 +1,12 @@
 //! Error motions of the axes as an identification has found them, `docs/model.md` (32): smooth deviations along the travel of a joint, and
 //! how its play varies there.
 
+mod form;
+mod room;
+
+pub(crate) use form::{MotionForm, forms, read};
+pub(crate) use room::{Motions, eliminate};
+
 use std::f64::consts::TAU;
 
 use crate::lie::Twist;

@@ -17,6 +17,7 @@ mod evaluate;
 mod express;
 mod expression;
 mod formula;
+mod node;
 mod samples;
 mod walk;
 mod weights;

@@ -9,10 +9,11 @@ mod evidence;
 mod fit;
 mod information;
 mod judge;
-mod linear;
 mod loss;
-mod motions;
 mod normal;
+mod optimum;
+mod places;
+mod set_up_values;
 mod solve;
 mod source;
 mod stretch;
@@ -22,15 +23,17 @@ mod unseen;
 mod upright;
 mod warnings;
 
-pub(crate) use evaluator::{Evaluator, Moment, Values};
+pub(crate) use evaluator::{EXTRAS, Evaluator, Moment, Values};
 pub use fit::{
     BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit,
     Suspect,
 };
-pub use information::{Functional, Information};
+pub use information::Information;
 pub use judge::{Figures, PieceFit};
-pub(crate) use linear::{Displaced, Linear, Span, linear};
 pub use loss::Loss;
+pub(crate) use optimum::{optimum, sources};
+pub(crate) use places::Places;
+pub(crate) use set_up_values::SetUpValues;
 pub use solve::{Solver, Stop};
 pub(crate) use source::{Known, Source, Sources, channel};
 pub(crate) use stretch::{Beginning, Memories, Stretch, by_dyad, stretches};
@@ -39,6 +42,7 @@ use serde::Serialize;
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
+use crate::error_motion::Motions;
 use crate::lie::{Pose, Twist};
 use crate::machine::Machine;
 use crate::recording::Recording;
@@ -47,11 +51,11 @@ use crate::units::Quantity;
 use crate::variation::{Variation, Varying};
 use evidence::Sizes;
 use information::Information as Info;
-use motions::Motions;
 use normal::{Noise, Normal, Sums, Tally};
 use solve::{Problem, Solution};
 use thin::Thin;
-use unknowns::{Block, Layout, Role, Unknowns};
+use unknowns::Block;
+pub(crate) use unknowns::{Layout, Role, Unknowns};
 use upright::{Frames, turn_gravity, upright};
 
 /// How to identify.
@@ -181,7 +185,8 @@ fn attempt(
     problem.prior = prior;
     problem.free = vec![true; layout.len];
     if prior {
-        problem.motions = Motions::new(machine, &sources, model.error_motions, varying.directions.as_ref());
+        let play = |j| varying.directions.as_ref().and_then(|directions| directions.play(machine, j));
+        problem.motions = Motions::new(machine, &sources.ranges(), model.error_motions, play);
     }
     let mut found = settle(&problem, options.solver, placed.unknowns, noise)?;
     let room = problem.motions.clone();
@@ -296,12 +301,8 @@ fn calibrated(machine: &Machine, sources: &Sources, found: &Found) -> Calibrated
         let sum = known.iter().fold(Twist::zero(0.0), |sum, dh| sum + *dh);
         deviations[machine.w_index()] = sum.times(1.0 / known.len() as f64);
     }
-    let seen = (0..machine.commands().len()).map(|c| {
-        let ranges = sources.all.iter().map(|s| s.summary.commands[c]);
-        Some(ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (from, to)| (l.min(from), h.max(to))))
-    });
-    let mut result =
-        CalibratedMachine::found(machine, deviations, seen.collect(), sources.samples(), found.rms());
+    let seen = sources.ranges().into_iter().map(Some).collect();
+    let mut result = CalibratedMachine::found(machine, deviations, seen, sources.samples(), found.rms());
     put_setups(&mut result, sources, unknowns);
     result
 }
@@ -313,15 +314,15 @@ fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &
         calibrated.setups.retain(|(known, _)| known != name);
         calibrated.setups.push((name.clone(), frame.pose()));
     }
-    for (name, at) in sources.tool_points.iter().zip(&unknowns.tool_points) {
+    for (name, at) in sources.tool_points.iter().zip(&unknowns.values.tool_points) {
         calibrated.tool_points.retain(|(known, _)| known != name);
         calibrated.tool_points.push((name.clone(), *at));
     }
-    for ((s, of), value) in sources.zeros.iter().zip(&unknowns.zeros) {
+    for ((s, of), value) in sources.zeros.iter().zip(&unknowns.values.zeros) {
         calibrated.zeros.retain(|(known, channel, _)| (known, channel) != (&sources.setups[*s], of));
         calibrated.zeros.push((setup(*s), of.clone(), *value));
     }
-    for (s, value) in sources.lengths.iter().zip(&unknowns.lengths) {
+    for (s, value) in sources.lengths.iter().zip(&unknowns.values.lengths) {
         calibrated.lengths.retain(|(known, _)| *known != sources.setups[*s]);
         calibrated.lengths.push((setup(*s), *value));
     }
@@ -481,19 +482,14 @@ fn with_stated(sources: &Sources, seen: &[Noise]) -> Vec<Noise> {
 fn enough_to_start(machine: &Machine, sources: &Sources) -> Result<()> {
     let moving = (0..machine.commands().len())
         .any(|c| sources.all.iter().any(|s| s.summary.moving.get(c).copied().unwrap_or(false)));
-    let several = |c: usize| {
-        let ranges = sources.all.iter().map(|s| s.summary.commands[c]);
-        let (low, high) =
-            ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (from, to)| (l.min(from), h.max(to)));
-        high - low > 1e-9
-    };
+    let several = sources.ranges().iter().any(|(low, high)| high - low > 1e-9);
     if sources.samples() < 2 {
         return Err(Error::Undetermined {
             what: "there is only one sample in all recordings".into(),
             mend: "record the same quantity at many positions of the joints".into(),
         });
     }
-    if !moving && !(0..machine.commands().len()).any(several) {
+    if !moving && !several {
         return Err(Error::Undetermined {
             what: "no joint moves in any recording: nothing of the machine can be identified".into(),
             mend: "record while the joints move through their travel".into(),

@@ -25,7 +25,6 @@ use num_dual::Dual64;
 use serde::Serialize;
 
 use crate::chain::{Chain, Sweep};
-use crate::identify::{Functional, Information};
 use crate::lie::{Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::scalar::Scalar;
@@ -42,6 +41,40 @@ const ALIGNED: f64 = 1e-3;
 const PARALLEL: f64 = 0.1;
 /// Components of an axis that differ by less are a tie.
 const TIE: f64 = 1e-6;
+
+/// What is known of a smooth function of the deviations, in its own unit squared. To first order, `docs/model.md` (24), (28).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Functional {
+    /// Variance that the tolerances alone allow.
+    pub prior_variance: f64,
+    /// Variance with the data (and the tolerances, where they act as a prior); infinite where nothing determines it.
+    pub posterior_variance: f64,
+    /// What part of the prior variance lies along combinations that the data do not see at all, 0 to 1.
+    pub unseen: f64,
+}
+
+impl Functional {
+    /// Nothing but the tolerances are known.
+    pub fn prior_only(prior_variance: f64) -> Self {
+        Functional { prior_variance, posterior_variance: prior_variance, unseen: 1.0 }
+    }
+
+    /// Share that comes from the data, `1 - posterior variance / prior variance`, 0 to 1.
+    pub fn share(&self) -> f64 {
+        if self.prior_variance > 0.0 {
+            (1.0 - self.posterior_variance / self.prior_variance).clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Whoever knows how sure functions of the deviations are.
+pub trait Knowledge {
+    /// What is known of a function that does not depend on `w`. `by_dyad_scaled`: its six derivatives by the deviation of every dyad
+    /// in machine order, each times its tolerance.
+    fn of_deviations(&self, by_dyad_scaled: &[f64]) -> Functional;
+}
 
 /// One location error.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -94,7 +127,7 @@ pub fn location_errors(
     machine: &Machine,
     deviations: &[Twist<f64>],
     reference_t: Vec3<f64>,
-    information: Option<&Information>,
+    information: Option<&dyn Knowledge>,
 ) -> LocationErrors {
     let none = |reason: String| LocationErrors {
         primary: None,

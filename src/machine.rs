@@ -7,13 +7,15 @@
 mod dyad;
 mod fault;
 mod form;
+mod number;
 mod read;
 mod side;
 mod write;
 
 pub use dyad::{Dyad, Joint, JointKind, MassPoint, NcWord, Placement, Tolerance};
 pub use fault::MachineFault;
-pub(crate) use form::{AngleUnit, LengthUnit, MachineForm, UnitsForm};
+pub(crate) use form::{AngleUnit, LengthUnit, MachineForm, Triple, UnitsForm};
+pub(crate) use number::{Checked, OF_CALIBRATION, number, vec_to_si};
 pub(crate) use read::{at_path, is_usable_name};
 pub use side::SideBranch;
 pub(crate) use write::{in_unit, to_text};

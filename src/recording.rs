@@ -121,7 +121,7 @@ impl Recording {
     /// Opens a file and reads header and column names; rows are not read, so that a fault in them shows only in a pass.
     ///
     /// # Errors
-    /// [`Error::File`], or [`Error::Recording`] with line and column: a missing joint, a column without unit, another machine.
+    /// [`Error::File`], or [`Error::Input`] with line and column: a missing joint, a column without unit, another machine.
     pub fn open(path: impl AsRef<Path>, machine: &Machine) -> Result<Recording> {
         Recording::read(path.as_ref().to_path_buf(), Source::File, machine)
     }
@@ -201,7 +201,7 @@ impl Recording {
     /// The samples in chunks of at most 4096, read anew from the file; after an error nothing more comes.
     ///
     /// # Errors
-    /// [`Error::File`] here; each chunk may bring [`Error::Recording`] with line and column.
+    /// [`Error::File`] here; each chunk may bring [`Error::Input`] with line and column.
     pub fn chunks(&self) -> Result<Chunks<'_>> {
         Ok(Pass::start(self)?.chunks())
     }
@@ -239,7 +239,7 @@ impl Recording {
 
 fn error(path: &Path, Fail { line, column, fault }: Fail) -> Error {
     let line = usize::try_from(line).unwrap_or(usize::MAX);
-    Error::Recording { place: Place::at(path, line, column), fault }
+    Error::input(Place::at(path, line, column), *fault)
 }
 
 fn stopped(path: &Path, stop: Stop, line: u64) -> Error {

@@ -11,23 +11,33 @@ use crate::machine::Machine;
 /// Where a part of a deviation acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
-    /// Before the joint of this dyad, as its constant deviation does: `M exp(dh) exp(xi q)`.
+    /// Before the joint of dyad `j`, as its constant deviation does: `M_j exp(dh) exp(xi_j q_j)`.
     Before(usize),
-    /// Behind the joint of this dyad, carried along: `M exp(xi q) exp(e)`.
-    Carried(usize),
-    /// On one scalar reading of the instrument, by its index.
-    Reading(usize),
+    /// After the joint of dyad `j`, carried along: `M_j exp(xi_j q_j) exp(e)`.
+    After(usize),
+    /// On what the instrument reads: the six numbers of the direction are weights of readings 0 to 5.
+    Reading,
 }
 
-/// One feature acting in one direction.
+/// One feature acting in one direction. `F`: the feature itself, or its index in a list.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct Part<F = Feature> {
     /// Where.
     pub slot: Slot,
-    /// Along which twist of that frame; of no meaning for a reading.
+    /// Along which twist in the frame of the slot.
     pub direction: Twist<f64>,
     /// How it changes from sample to sample.
-    pub feature: Feature,
+    pub feature: F,
+}
+
+impl<F> Part<F> {
+    /// By how much reading `i` itself changes with the feature; 0 for a part that acts on the machine.
+    pub fn weight(&self, reading: usize) -> f64 {
+        match self.slot {
+            Slot::Reading => self.direction.to_array()[reading],
+            Slot::Before(_) | Slot::After(_) => 0.0,
+        }
+    }
 }
 
 /// Parts that share one coefficient.

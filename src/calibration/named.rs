@@ -2,13 +2,13 @@
 
 use super::pieces::{command, unit, unknown};
 use super::{AxisForm, CalibratedMachine, CalibrationForm, checked};
-use crate::effects::{Slot as Seat, StoredEffect, StoredTerm, by_setup};
+use crate::effects::{StoredEffect, StoredTerm, by_setup};
 use crate::feature::{Expression, Feature, Unbound};
-use crate::machine::{Machine, MachineFault};
+use crate::machine::{Checked, Machine, MachineFault};
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 use crate::units::Unit;
-use crate::variation::{Part, Slot, Term, Variation};
+use crate::variation::{Part, Term, Variation};
 
 /// An effect that is not used, and why.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
@@ -173,7 +173,7 @@ impl CalibratedMachine {
     }
 
     /// Effects with their dead bands and their clock back from the file.
-    pub(super) fn read_effects(&mut self, form: &CalibrationForm) -> Result<(), (String, MachineFault)> {
+    pub(super) fn read_effects(&mut self, form: &CalibrationForm) -> Checked<()> {
         if let Some((from, to)) = form.clock {
             checked("calibration.clock[0]".into(), from)?;
             checked("calibration.clock[1]".into(), to)?;
@@ -260,24 +260,7 @@ fn not_in(recording: &Recording, effect: &StoredEffect, features: &[&Feature]) -
 
 /// The terms of an effect with their values.
 pub(crate) fn terms(machine: &Machine, effect: &StoredEffect) -> Result<Vec<(f64, Term)>, Unbound> {
-    let part = |part: crate::effects::BoundPart| -> Vec<Part> {
-        let on_machine = |slot| vec![Part { slot, direction: part.direction, feature: part.feature.clone() }];
-        match part.slot {
-            Seat::Before(j) => on_machine(Slot::Before(j)),
-            Seat::After(j) => on_machine(Slot::Carried(j)),
-            // A direction of the readings holds the weight of each.
-            Seat::Reading => (part.direction.to_array().into_iter().enumerate())
-                .filter(|(_, weight)| *weight != 0.0)
-                .map(|(i, weight)| Part {
-                    slot: Slot::Reading(i),
-                    direction: part.direction,
-                    feature: part.feature.scaled(weight),
-                })
-                .collect(),
-        }
-    };
-    let term = |(value, parts): (f64, Vec<crate::effects::BoundPart>)| {
-        let parts = parts.into_iter().flat_map(part).collect();
+    let term = |(value, parts): (f64, Vec<Part>)| {
         (value, Term { parts, scale: value.abs().max(f64::MIN_POSITIVE), prior: false, of_setup: false })
     };
     Ok(effect.bind(machine)?.into_iter().map(term).collect())

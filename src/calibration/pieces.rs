@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{DeviationForm, checked, deviation_forms, deviations};
-use crate::machine::{JointKind, Machine, MachineFault};
+use crate::machine::{Checked, JointKind, Machine, MachineFault};
 use crate::units::Unit;
 use crate::variation::{Directions, MOST_AXES, Variation, Varying};
 
@@ -38,8 +38,6 @@ struct PieceForm {
     samples: u64,
 }
 
-type Faulty<T> = Result<T, (String, MachineFault)>;
-
 impl PiecesForm {
     /// From a model that is keyed on directions.
     pub fn of(machine: &Machine, variation: &Variation) -> Option<Self> {
@@ -59,7 +57,7 @@ impl PiecesForm {
     }
 
     /// Back from the file.
-    pub fn read(&self, machine: &Machine) -> Faulty<Variation> {
+    pub fn read(&self, machine: &Machine) -> Checked<Variation> {
         let path = "calibration.pieces";
         let mut dead_bands = vec![0.0; machine.commands().len()];
         let mut axes = Vec::new();

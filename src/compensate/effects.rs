@@ -91,8 +91,8 @@ impl<'a> Effects<'a> {
                 let by = coefficient * values.next().copied().unwrap_or(0.0);
                 match part.slot {
                     Slot::Before(j) => before[j] = before[j] + part.direction.times(by),
-                    Slot::Carried(j) => behind[j] = behind[j] + part.direction.times(by),
-                    Slot::Reading(_) => {}
+                    Slot::After(j) => behind[j] = behind[j] + part.direction.times(by),
+                    Slot::Reading => {}
                 }
             }
         }

@@ -1,5 +1,7 @@
 //! Why a program cannot be corrected as it stands, and the mend for each.
 
+use crate::error::Fault;
+
 /// A block whose correction matters and cannot be written.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -114,9 +116,8 @@ fn without(axes: &[String]) -> String {
     format!(": the program has not placed {} before it", axes.join(", "))
 }
 
-impl CompensateFault {
-    /// How to mend it.
-    pub fn mend(&self) -> String {
+impl Fault for CompensateFault {
+    fn mend(&self) -> String {
         use CompensateFault::*;
         match self {
             Expression { .. } => "let the CAM system or an editor put the number in, then compensate".into(),

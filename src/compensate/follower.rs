@@ -82,7 +82,7 @@ pub(super) struct Follower<'a> {
 
 /// A refusal at a byte of a block.
 pub(super) fn refuse<T>(block: &Block, byte: usize, fault: CompensateFault) -> Result<T> {
-    Err(Error::Compensate { place: block.place(byte), fault: Box::new(fault) })
+    Err(Error::input(block.place(byte), fault))
 }
 
 /// The block without its end and blanks around.
@@ -173,7 +173,7 @@ impl<'a> Follower<'a> {
     /// Follows one block and writes it, with what stands in its place.
     ///
     /// # Errors
-    /// [`Error::Compensate`] where it cannot be corrected, [`Error::Nc`] where it cannot be read.
+    /// [`Error::Input`] where it cannot be read or corrected.
     pub fn block(&mut self, block: &mut Block, out: &mut dyn Write) -> Result<()> {
         if self.ended {
             return put(block, out);

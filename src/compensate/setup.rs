@@ -111,7 +111,7 @@ impl Setup {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Ron`] with line and column.
+    /// [`Error::File`], [`Error::Input`] with line and column.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         Self::from_document(&Document::open(path)?.guided(GUIDE))
     }
@@ -136,11 +136,11 @@ impl Setup {
             .chain([("reference_length".to_string(), form.reference_length)]);
         for (path, value) in numbers {
             if !(value.is_finite() && value.abs() < 1e9) {
-                return Err(Error::Ron {
-                    place: document.place_of(path.split('.').next().unwrap_or_default()),
-                    message: format!("`{path}` is {value}"),
-                    mend: "write a number of ordinary size".into(),
-                });
+                return Err(Error::mistake(
+                    document.place_of(path.split('.').next().unwrap_or_default()),
+                    format!("`{path}` is {value}"),
+                    "write a number of ordinary size",
+                ));
             }
         }
         let units = form.units.unwrap_or(UnitsForm { length: Length::mm, angle: Angle::deg });

@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::search::Search;
 use super::space::{Space, gram};
-use crate::effects::Slot;
 use crate::machine::Machine;
+use crate::variation::Slot;
 
 /// Hats along the travel: at most so many, each over so many samples at least.
 const HATS: usize = 24;

@@ -3,14 +3,14 @@
 use nalgebra::DVector;
 
 use super::held_out::Model;
+use super::linear::{Displaced, Linear};
 use super::search::{Active, Search};
 use super::space::Space;
-use crate::effects::{Candidate, Slot};
+use crate::effects::Candidate;
 use crate::error::Result;
-use crate::identify::{Displaced, Linear};
 use crate::machine::Machine;
 use crate::recording::Recording;
-use crate::variation::{self, Term};
+use crate::variation::{Part, Slot, Term};
 
 /// Half of so much energy that no effect accounts for, in units of the noise's variance, sways the odds of names.
 const SWAYS: f64 = 10.0;
@@ -40,14 +40,12 @@ pub(super) fn straightened(
         for (coefficient, value) in candidate.coefficients.iter().zip(model.coefficients(search, active, i)) {
             let mut parts = Vec::new();
             for part in &coefficient.parts {
-                let slot = match part.slot {
-                    Slot::Before(j) => variation::Slot::Before(j),
-                    Slot::After(j) => variation::Slot::Carried(j),
-                    // What is added to a reading bends nothing.
-                    Slot::Reading => continue,
-                };
+                // What is added to a reading bends nothing.
+                if part.slot == Slot::Reading {
+                    continue;
+                }
                 let feature = candidate.features[part.feature].clone();
-                parts.push(variation::Part { slot, direction: part.direction, feature });
+                parts.push(Part { slot: part.slot, direction: part.direction, feature });
                 to.features.push(features[part.feature].clone());
             }
             to.terms.push(Term { parts, scale: 1.0, prior: false, of_setup: false });

@@ -7,8 +7,9 @@ use nalgebra::{DMatrix, DVector};
 use super::coarse::{AtPoint, Features, Level};
 use super::score::{BATCH, Best, Equations, Field, Rows, best, is_of_number, judge, key, lengths, unit};
 use super::space::Space;
-use crate::effects::{Candidate, Slot};
+use crate::effects::Candidate;
 use crate::lie::Twist;
+use crate::variation::Slot;
 
 /// Where features vanish on all but this part of the samples, only those are looked at.
 const SPARSE: f64 = 0.3;

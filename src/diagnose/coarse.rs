@@ -2,10 +2,10 @@
 
 use std::sync::OnceLock;
 
+use super::linear::Linear;
 use super::panel::{LEVELS, Panel, WIDTH};
 use crate::effects::Candidate;
 use crate::feature::Samples;
-use crate::identify::Linear;
 
 /// Long blocks of samples, and shorter ones for what changes faster.
 pub(super) struct Coarse {

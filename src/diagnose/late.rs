@@ -8,8 +8,9 @@ use super::diagnosis::{Diagnosis, HeldOutRms};
 use super::held_out::Model;
 use super::search::{Active, Search};
 use super::shape;
-use crate::effects::{Candidate, Place, Slot};
+use crate::effects::{Candidate, Place};
 use crate::feature::Feature;
+use crate::variation::Slot;
 
 /// Half of so much energy by which the effects change, in units of the noise's variance, sways the odds of names.
 const SWAYS: f64 = 10.0;

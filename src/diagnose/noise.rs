@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use crate::identify::{Linear, Span};
+use super::linear::{Linear, Span};
 
 /// Noise of one kind of reading: first-order autoregressive, and rounding to the step of its readings.
 #[derive(Clone, Copy, Debug, PartialEq)]

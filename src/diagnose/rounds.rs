@@ -8,6 +8,7 @@ use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
 use super::folds;
 use super::late::{self, late};
+use super::linear::{Linear, linear};
 use super::noise::{self, Noise};
 use super::report;
 use super::score::Rows;
@@ -16,7 +17,7 @@ use super::speeds::less_rare;
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Library, RecordingFacts};
 use crate::error::Result;
-use crate::identify::{Linear, Options, linear};
+use crate::identify::Options;
 use crate::machine::Machine;
 use crate::recording::Recording;
 

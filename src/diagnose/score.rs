@@ -7,13 +7,13 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::coarse::{Coarse, Features};
 use super::evidence::{Worth, evidence, log_mean_exp, rarity, sizes_up_to};
+use super::linear::Linear;
 use super::space::Space;
-use super::waves::Wave;
 use super::whitener::Whitener;
-use crate::effects::{Candidate, Coefficient, Slot};
+use crate::effects::{Candidate, Coefficient};
 use crate::feature::Dimension;
-use crate::identify::Linear;
 use crate::lie::Twist;
+use crate::variation::Slot;
 
 /// Rows of the recordings and what turns them white.
 pub(super) struct Rows<'a> {
@@ -53,6 +53,14 @@ pub(super) struct Equations {
     pub toward: DVector<f64>,
     /// Square norms of the columns themselves.
     whole: DVector<f64>,
+}
+
+/// Phase of a pair of features over the grid.
+pub(super) struct Wave {
+    /// Phase at every sample, over the largest.
+    pub(super) x: Vec<f64>,
+    /// The largest phase, at every point of the grid.
+    pub(super) factors: Vec<f64>,
 }
 
 impl Equations {

@@ -7,9 +7,10 @@ use nalgebra::DMatrix;
 
 use super::coarse::Level;
 use super::score::{Column, Rows};
-use crate::effects::{Place, Slot};
+use crate::effects::Place;
 use crate::elementary::sines_cosines;
 use crate::lie::Twist;
+use crate::variation::Slot;
 
 /// Orders of what is smooth, along a joint's travel or over time.
 const SMOOTH: usize = 12;

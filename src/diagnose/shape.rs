@@ -9,9 +9,10 @@ use super::curves::{column, product};
 use super::score::Rows;
 use super::search::Active;
 use super::space::gram;
-use crate::effects::{Candidate, Place, Slot};
+use crate::effects::{Candidate, Place};
 use crate::feature::{Feature, Samples};
 use crate::lie::Twist;
+use crate::variation::Slot;
 
 /// A column of the shape may have this part of the effect's amplitude.
 const PART: f64 = 0.3;

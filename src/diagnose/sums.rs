@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::course::Course;
 use super::evidence::{Worth, evidence};
+use super::linear::Span;
 use super::score::{Field, Rows, judge};
 use super::series::{Motion, Series, Standing};
-use crate::identify::Span;
 
 /// Waves over the range of each joint: the fewest, the most, and by how many they are apart.
 const FEWEST: f64 = 0.5;

@@ -2,9 +2,9 @@
 
 use super::diagnosis::Diagnosis;
 use super::held_out::Model;
+use super::linear::Span;
 use super::search::{Active, Search};
 use crate::effects::Place;
-use crate::identify::Span;
 use crate::machine::{JointKind, Machine};
 
 /// Residuals (measured minus model) along every recording, and curves of what was found.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::passing::{Passed, add_energies};
-use super::score::{Column, Field, Key, Rows, key};
+use super::score::{Column, Field, Key, Rows, Wave, key};
 use super::spectrum;
 use crate::effects::{Candidate, Coefficient};
 use crate::feature::Feature;
@@ -12,14 +12,6 @@ use crate::feature::Feature;
 const MEMORIES: usize = 256;
 /// Phases that differ by no more than this part of the largest are multiples of each other.
 const STRAIGHT: f64 = 1e-9;
-
-/// Phase of a pair of features over the grid.
-pub(super) struct Wave {
-    /// Phase at every sample, over the largest.
-    x: Vec<f64>,
-    /// The largest phase, at every point of the grid.
-    factors: Vec<f64>,
-}
 
 /// Columns of one phase that share their sums: weights of the samples, up to two, and energies of each pair of features at its factors.
 struct Sums<'a> {

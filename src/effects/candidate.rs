@@ -5,22 +5,12 @@ use super::facts::RecordingFacts;
 use super::family::{Clock, Directions, Family, Grid, Range};
 use super::grid;
 use super::library::Library;
-use super::place::{Place, Slot, joint_name, places};
+use super::place::{Place, joint_name, places};
 use crate::feature::{Binding, Dimension, Expression, Feature, Scope, Unbound, dimension_of};
 use crate::lie::Twist;
 use crate::machine::{Dyad, Machine};
 use crate::units::Unit;
-
-/// One summand: coefficient × feature × direction in a slot.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Part {
-    /// Where it stands.
-    pub slot: Slot,
-    /// Its direction in the frame of the slot.
-    pub direction: Twist<f64>,
-    /// Index in [`Candidate::features`].
-    pub feature: usize,
-}
+use crate::variation::{Part, Slot};
 
 /// A number to be found. Its parts share it.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,8 +23,8 @@ pub struct Coefficient {
     pub dimension: Dimension,
     /// Root mean square that coefficient × feature has on machines in use, m or rad (of the first part's direction).
     pub size: f64,
-    /// What it multiplies.
-    pub parts: Vec<Part>,
+    /// What it multiplies; their features are indices in [`Candidate::features`].
+    pub parts: Vec<Part<usize>>,
 }
 
 /// A parameter of the features, to be found on the grid and then by its derivatives.

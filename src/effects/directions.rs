@@ -2,11 +2,12 @@
 
 use super::facts::RecordingFacts;
 use super::family::{Directions, Family, Pivot};
-use super::place::{Place, Slot};
+use super::place::Place;
 use crate::feature::Dimension;
 use crate::lie::{Twist, Vec3};
 use crate::machine::Machine;
 use crate::units::Quantity;
+use crate::variation::Slot;
 
 /// Name, slot, direction and unit of each direction at a place.
 pub(super) fn directions(

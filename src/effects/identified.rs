@@ -4,11 +4,12 @@ use serde::{Deserialize, Serialize};
 
 use super::candidate::Candidate;
 use super::family::{Family, Meaning, Output};
-use super::place::{Place, Slot};
+use super::place::Place;
 use super::quantity::in_words;
 use crate::feature::{Binding, Dimension, Expression, Feature, Samples, Unbound};
 use crate::lie::{Twist, Vec3};
 use crate::machine::Machine;
+use crate::variation::{Part, Slot};
 
 /// An effect that was found.
 #[derive(Clone, Debug)]
@@ -389,23 +390,12 @@ pub enum StoredSlot {
     Reading,
 }
 
-/// A stored part bound to a machine again.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BoundPart {
-    /// Where it stands.
-    pub slot: Slot,
-    /// Its direction.
-    pub direction: Twist<f64>,
-    /// Its feature, without parameters.
-    pub feature: Feature,
-}
-
 impl StoredEffect {
     /// Coefficients with their parts on a machine.
     ///
     /// # Errors
     /// A frame or joint that the machine does not have; a number that is none.
-    pub fn bind(&self, machine: &Machine) -> Result<Vec<(f64, Vec<BoundPart>)>, Unbound> {
+    pub fn bind(&self, machine: &Machine) -> Result<Vec<(f64, Vec<Part>)>, Unbound> {
         let travel = vec![None; machine.dyads().len()];
         let (own, partner, time) = (None, None, None);
         let binding = Binding { machine, own, partner, travel: &travel, time, begins: &[], parameters: &[] };
@@ -434,7 +424,7 @@ impl StoredEffect {
                 return Err(Unbound::Number);
             }
             let direction = Twist::from_array(direction);
-            Ok(BoundPart { slot, direction, feature: Feature::bind(&part.feature, &binding)? })
+            Ok(Part { slot, direction, feature: Feature::bind(&part.feature, &binding)? })
         };
         let term = |term: &StoredTerm| match term.value.is_finite() {
             true => Ok((term.value, term.parts.iter().map(part).collect::<Result<_, _>>()?)),

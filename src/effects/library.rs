@@ -51,7 +51,7 @@ impl Library {
     /// This library with the families of a file added; those whose name it has already are replaced.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Ron`] or [`Error::Effects`], the last two with line and column.
+    /// [`Error::File`], or [`Error::Input`] with line and column.
     pub fn with_file(self, path: impl AsRef<Path>) -> Result<Self> {
         self.with_document(Document::open(path)?)
     }
@@ -67,8 +67,7 @@ impl Library {
     fn with_document(mut self, document: Document) -> Result<Self> {
         let document = document.guided(GUIDE);
         let form: LibraryForm = document.read()?;
-        let at =
-            |(path, fault): (String, LibraryFault)| Error::Effects { place: document.place_of(&path), fault };
+        let at = |(path, fault): (String, LibraryFault)| Error::input(document.place_of(&path), fault);
         if form.families.is_empty() {
             return Err(at((
                 "families".into(),

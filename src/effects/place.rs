@@ -43,17 +43,6 @@ impl Place {
     }
 }
 
-/// Where a deviation stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Slot {
-    /// `M_j exp(deviation) exp(xi_j q_j)`.
-    Before(usize),
-    /// `M_j exp(xi_j q_j) exp(deviation)`.
-    After(usize),
-    /// Added to what the instrument reads: the six numbers of the direction are weights of readings 0 to 5.
-    Reading,
-}
-
 /// Name of the joint of a dyad, or of its frame where it has none.
 pub(super) fn joint_name(machine: &Machine, j: usize) -> String {
     machine.dyads()[j]

@@ -1,6 +1,7 @@
 //! Whether a family makes sense, whatever the machine.
 
 use super::family::{Directions, Family, Grid, Meaning, Output, ParameterForm, Range, Seat};
+use crate::error::Fault;
 use crate::feature::{Dimension, Expression, Scope, dimension_of};
 use crate::machine::JointKind;
 
@@ -17,6 +18,12 @@ pub struct LibraryFault {
     pub what: String,
     /// How to mend it.
     pub mend: String,
+}
+
+impl Fault for LibraryFault {
+    fn mend(&self) -> String {
+        self.mend.clone()
+    }
 }
 
 pub(super) fn fault(what: impl Into<String>, mend: impl Into<String>) -> LibraryFault {

@@ -1,6 +1,6 @@
-//! From an expression to a feature of one machine, and back.
+//! From an expression to a feature of one machine.
 
-use super::express::express;
+use super::node::{Column, Function, Node};
 use super::{Expression, weights};
 use crate::machine::Machine;
 use crate::units::Unit;
@@ -11,75 +11,6 @@ pub struct Feature {
     pub(super) node: Node,
     /// How many parts have history.
     pub(super) memories: usize,
-}
-
-/// Joints are indices of dyads.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Node {
-    Number(f64),
-    Parameter(usize),
-    Joint(usize, Column),
-    /// Where a joint is when it is so many seconds late.
-    Late(usize, f64),
-    Time(f64),
-    /// Names of recordings, and with which number they begin; whether the number of the own recording's beginning is meant.
-    Order(Vec<(String, f64)>, bool),
-    /// Name and unit.
-    Channel(String, String),
-    /// What needs further columns, by name and unit.
-    Needing(Vec<(String, String)>, Box<Node>),
-    /// Names of recordings.
-    Only(Vec<String>, Box<Node>),
-    Sum(Vec<Node>),
-    Product(Vec<Node>),
-    Quotient(Box<[Node; 2]>),
-    Power(Box<Node>, i8),
-    Function(Function, Box<Node>),
-    Chebyshev(u8, Box<Node>),
-    Between(Box<Node>, f64, f64),
-    Play {
-        joint: usize,
-        width: Box<Node>,
-        memory: usize,
-    },
-    TakeUp {
-        joint: usize,
-        length: Box<Node>,
-        memory: usize,
-    },
-    Lag {
-        of: Box<Node>,
-        time: Box<Node>,
-        memory: usize,
-    },
-}
-
-/// A column of [`super::JointSamples`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Column {
-    Position,
-    Direction,
-    Velocity,
-    Acceleration,
-    SinceReversal,
-    Travelled,
-    Gravity,
-    Load,
-    /// A column of `JointSamples::weights`.
-    Weight(usize),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Function {
-    Sin,
-    Cos,
-    Exp,
-    Abs,
-    Sign,
-    Positive,
-    Step,
-    Saturate,
-    Bump,
 }
 
 /// What an expression is bound to.
@@ -178,17 +109,6 @@ impl Feature {
         let mut node = other.node;
         renumber(&mut node, self.memories);
         Feature { node: Node::Product(vec![self.node, node]), memories }
-    }
-
-    /// The feature times a number.
-    pub fn scaled(&self, factor: f64) -> Self {
-        if factor == 1.0 {
-            return self.clone();
-        }
-        Feature {
-            node: Node::Product(vec![Node::Number(factor), self.node.clone()]),
-            memories: self.memories,
-        }
     }
 
     /// The feature in recordings of these names, 0 in others.
@@ -313,11 +233,6 @@ impl Feature {
         joints.sort_unstable();
         joints.dedup();
         joints
-    }
-
-    /// The expression that binds to this feature on the same machine without knowing of any recording: what is stored in files.
-    pub fn to_expression(&self, machine: &Machine, parameters: &[String]) -> Expression {
-        express(&self.node, machine, parameters)
     }
 }
 

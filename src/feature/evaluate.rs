@@ -2,7 +2,8 @@
 
 use num_dual::DualSVec64;
 
-use super::bind::{Column, Feature, Function, Node};
+use super::bind::Feature;
+use super::node::{Column, Function, Node};
 use super::{JointSamples, Samples};
 use crate::Scalar;
 

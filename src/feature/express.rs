@@ -1,11 +1,19 @@
 //! From a bound feature back to an expression: what calibrated files keep.
 
-use super::bind::{Column, Function, Node};
+use super::bind::Feature;
+use super::node::{Column, Function, Node};
 use super::{Expression, weights};
 use crate::machine::Machine;
 
+impl Feature {
+    /// The expression that binds to this feature on the same machine without knowing of any recording: what is stored in files.
+    pub fn to_expression(&self, machine: &Machine, parameters: &[String]) -> Expression {
+        express(&self.node, machine, parameters)
+    }
+}
+
 /// What binds to this node on the same machine without knowing of any recording.
-pub(super) fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression {
+fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression {
     use Expression as E;
     let inner = |e: &Node| Box::new(express(e, machine, parameters));
     let list = |nodes: &[Node]| nodes.iter().map(|e| express(e, machine, parameters)).collect();

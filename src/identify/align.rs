@@ -103,7 +103,7 @@ fn align_setup(sources: &Sources, setup: usize, sights: Vec<Sight>, unknowns: &m
 /// How far a sight with a position lies off, m.
 fn miss(sources: &Sources, sight: &Sight, m_from_w: Pose<f64>, unknowns: &Unknowns) -> Option<f64> {
     let source = &sources.all[sight.source];
-    let p_m = sight.m_from_t.transform(unknowns.sensor_state(source).tool_point_t);
+    let p_m = sight.m_from_t.transform(unknowns.values.sensor_state(source).tool_point_t);
     match source.sensor {
         Sensor::Position | Sensor::Pose => Some((m_from_w.transform(point(&sight.values)) - p_m).norm()),
         _ => None,
@@ -149,7 +149,7 @@ fn start_tool_points(sources: &Sources, sights: &[&Sight], unknowns: &mut Unknow
     }
     let Some(solution) = least_squares(matrix, &right) else { return };
     for (n, index) in points.iter().enumerate() {
-        unknowns.tool_points[*index] = point(&solution.as_slice()[12 + 3 * n..]);
+        unknowns.values.tool_points[*index] = point(&solution.as_slice()[12 + 3 * n..]);
     }
 }
 
@@ -161,7 +161,7 @@ fn shift_tool_points(
     unknowns: &mut Unknowns,
 ) -> bool {
     let mut any = false;
-    for index in 0..unknowns.tool_points.len() {
+    for index in 0..unknowns.values.tool_points.len() {
         let own = sights.iter().filter(|s| {
             let source = &sources.all[s.source];
             source.tool_point.unknown() == Some(index)
@@ -173,7 +173,7 @@ fn shift_tool_points(
             count += 1.0;
         }
         if count > 0.0 {
-            unknowns.tool_points[index] = sum.times(1.0 / count);
+            unknowns.values.tool_points[index] = sum.times(1.0 / count);
             any = true;
         }
     }
@@ -196,7 +196,7 @@ fn best_frame(
         if own.is_empty() {
             continue;
         }
-        let p_t = unknowns.sensor_state(source).tool_point_t;
+        let p_t = unknowns.values.sensor_state(source).tool_point_t;
         let modelled = |s: &Sight| s.m_from_t.transform(p_t);
         match &source.sensor {
             Sensor::Position => pairs.extend(own.iter().map(|s| (point(&s.values), modelled(s)))),
@@ -217,7 +217,7 @@ fn best_frame(
                 if let Some((centre_m, length)) = trilaterate(&own, &modelled, known) {
                     pairs.push((source.recording.header().workpiece_point, centre_m));
                     if let (Known::Unknown(i), Some(length)) = (source.length, length) {
-                        unknowns.lengths[i] = length;
+                        unknowns.values.lengths[i] = length;
                     }
                 }
             }
@@ -348,8 +348,8 @@ fn least_squares(matrix: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f
 
 /// A start for lengths that no trilateration has given: what the nominal distances leave over.
 fn start_lengths(machine: &Machine, sources: &Sources, thin: &[Thin], unknowns: &mut Unknowns) {
-    for index in 0..unknowns.lengths.len() {
-        if unknowns.lengths[index] != 0.0 {
+    for index in 0..unknowns.values.lengths.len() {
+        if unknowns.values.lengths[index] != 0.0 {
             continue;
         }
         let (mut sum, mut count) = (0.0, 0.0);
@@ -358,14 +358,14 @@ fn start_lengths(machine: &Machine, sources: &Sources, thin: &[Thin], unknowns: 
             if source.length.unknown() != Some(index) {
                 continue;
             }
-            let state = unknowns.sensor_state(source);
+            let state = unknowns.values.sensor_state(source);
             let w_from_t = unknowns.chain(machine, source.setup).w_from_t(&sample.q);
             let distance = (w_from_t.transform(state.tool_point_t) - state.workpiece_point_w).norm();
             sum += distance - sample.values[0];
             count += 1.0;
         }
         if count > 0.0 {
-            unknowns.lengths[index] = sum / count;
+            unknowns.values.lengths[index] = sum / count;
         }
     }
 }

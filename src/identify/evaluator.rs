@@ -69,7 +69,7 @@ impl<'a> Evaluator<'a> {
             // An identification eliminates them.
             motions: &NO_MOTIONS,
         };
-        let state = unknowns.sensor_state(source);
+        let state = unknowns.values.sensor_state(source);
         Self::with(machine, &source.sensor, state, frame.previous_from_w, &dh, values)
     }
 
@@ -111,7 +111,7 @@ impl<'a> Evaluator<'a> {
         changing.extend(motions.joints.iter().map(|motion| motion.dyad));
         changing.sort_unstable();
         changing.dedup();
-        let carried = among(|s| if let Slot::Carried(j) = s { Some(j) } else { None });
+        let carried = among(|s| if let Slot::After(j) = s { Some(j) } else { None });
         Evaluator {
             machine,
             sensor,
@@ -192,8 +192,8 @@ impl<'a> Evaluator<'a> {
                 let added = part.direction.times(coefficient * *feature);
                 match part.slot {
                     Slot::Before(j) => work.before[j] = work.before[j] + added,
-                    Slot::Carried(j) => work.behind[j] = work.behind[j] + added,
-                    Slot::Reading(_) => {}
+                    Slot::After(j) => work.behind[j] = work.behind[j] + added,
+                    Slot::Reading => {}
                 }
             }
         }
@@ -231,7 +231,7 @@ impl<'a> Evaluator<'a> {
                 rows[6 * dyads + 3] = 1.0;
                 if let Moment::At(..) = moment {
                     self.term_columns(0, &mut rows[..width], work, |_, part| match part.slot {
-                        Slot::Before(j) | Slot::Carried(j) if j == dyad => along(xi, part.direction),
+                        Slot::Before(j) | Slot::After(j) if j == dyad => along(xi, part.direction),
                         _ => 0.0,
                     });
                 }
@@ -300,10 +300,10 @@ impl<'a> Evaluator<'a> {
             .collect();
         self.term_columns(reading, row, work, |row, part| match part.slot {
             Slot::Before(j) => dot(&row[6 * j..6 * j + 6], part.direction),
-            Slot::Carried(j) => {
+            Slot::After(j) => {
                 carried.iter().find(|(own, _)| *own == j).map_or(0.0, |(_, b)| dot(b, part.direction))
             }
-            Slot::Reading(_) => 0.0,
+            Slot::Reading => 0.0,
         });
     }
 
@@ -318,13 +318,7 @@ impl<'a> Evaluator<'a> {
         for (t, term) in self.terms.iter().enumerate() {
             let column: f64 = (term.parts.iter().zip(&work.features[t]))
                 .map(|(part, feature)| match part.slot {
-                    Slot::Reading(i) => {
-                        if i == reading {
-                            *feature
-                        } else {
-                            0.0
-                        }
-                    }
+                    Slot::Reading => feature * part.weight(reading),
                     _ => feature * by_direction(row, part),
                 })
                 .sum();
@@ -340,9 +334,7 @@ impl<'a> Evaluator<'a> {
         let mut sum = 0.0;
         for ((term, coefficient), features) in self.terms.iter().zip(self.coefficients).zip(&work.features) {
             for (part, feature) in term.parts.iter().zip(features) {
-                if part.slot == Slot::Reading(reading) {
-                    sum += coefficient * feature;
-                }
+                sum += part.weight(reading) * coefficient * feature;
             }
         }
         sum

@@ -2,9 +2,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::motions::{Motions, eliminate};
 use super::solve::Solution;
 use super::unknowns::Layout;
+use crate::error_motion::{Motions, eliminate};
 
 /// Information on an unknown without prior, over the largest: keeps the matrix definite where the data say nothing, and is the same
 /// for all candidates.

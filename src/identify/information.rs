@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::unknowns::{Layout, Role};
+use crate::location::{Functional, Knowledge};
 
 /// Eigenvalues of the scaled information below this part of the largest are rounding: not seen.
 pub(crate) const SEEN: f64 = 1e-12;
@@ -36,33 +37,6 @@ pub struct Information {
     pub prior: bool,
     /// Where the deviation of a dyad starts in the parameter vector, machine order; `None` for `w`, which belongs to the set-ups.
     pub dyads: Vec<Option<usize>>,
-}
-
-/// What is known of a smooth function of the deviations, in its own unit squared. To first order, `docs/model.md` (24), (28).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Functional {
-    /// Variance that the tolerances alone allow.
-    pub prior_variance: f64,
-    /// Variance with the data (and the tolerances, where they act as a prior); infinite where nothing determines it.
-    pub posterior_variance: f64,
-    /// What part of the prior variance lies along combinations that the data do not see at all, 0 to 1.
-    pub unseen: f64,
-}
-
-impl Functional {
-    /// Nothing but the tolerances are known.
-    pub fn prior_only(prior_variance: f64) -> Self {
-        Functional { prior_variance, posterior_variance: prior_variance, unseen: 1.0 }
-    }
-
-    /// Share that comes from the data, `1 - posterior variance / prior variance`, 0 to 1.
-    pub fn share(&self) -> f64 {
-        if self.prior_variance > 0.0 {
-            (1.0 - self.posterior_variance / self.prior_variance).clamp(0.0, 1.0)
-        } else {
-            0.0
-        }
-    }
 }
 
 impl Information {
@@ -99,17 +73,6 @@ impl Information {
             posterior_variance = f64::INFINITY;
         }
         Functional { prior_variance, posterior_variance, unseen }
-    }
-
-    /// As [`Information::of_functional`], with six derivatives per dyad in machine order, for a function that does not depend on `w`.
-    pub fn of_deviations(&self, by_dyad_scaled: &[f64]) -> Functional {
-        let mut gradient = vec![0.0; self.variance.len()];
-        for (own, at) in by_dyad_scaled.chunks_exact(6).zip(&self.dyads) {
-            if let Some(at) = at {
-                gradient[*at..*at + 6].copy_from_slice(own);
-            }
-        }
-        self.of_functional(&gradient)
     }
 
     /// From the data's matrix in m and rad; `prior` says whether the blocks' priors count, `open` what the data leave open.
@@ -167,6 +130,18 @@ impl Information {
         let dyads =
             (0..layout.dyad_count()).map(|j| layout.block(Role::Dyad(j)).map(|block| block.offset)).collect();
         Information { rank, directions, strength, positions, variance, open, used, prior, dyads }
+    }
+}
+
+impl Knowledge for Information {
+    fn of_deviations(&self, by_dyad_scaled: &[f64]) -> Functional {
+        let mut gradient = vec![0.0; self.variance.len()];
+        for (own, at) in by_dyad_scaled.chunks_exact(6).zip(&self.dyads) {
+            if let Some(at) = at {
+                gradient[*at..*at + 6].copy_from_slice(own);
+            }
+        }
+        self.of_functional(&gradient)
     }
 }
 

@@ -6,7 +6,6 @@ use rand::rngs::StdRng;
 
 use super::evaluator::{EXTRAS, Evaluator, Moment};
 use super::loss::Loss;
-use super::motions::{Motions, eliminate};
 use super::source::{Source, Sources};
 use super::stretch::Stretch;
 use super::thin::Thin;
@@ -14,6 +13,7 @@ use super::unknowns::{Layout, Role, Unknowns};
 use crate::chain::deviation_jacobian;
 use crate::check::random_command;
 use crate::error::Result;
+use crate::error_motion::{Motions, eliminate};
 use crate::lie::{Twist, Vec3, Wrench};
 use crate::machine::Machine;
 use crate::motion::Tracker;

@@ -5,12 +5,12 @@ use serde::Serialize;
 
 use super::information::open_directions;
 use super::loss::Loss;
-use super::motions::Motions;
 use super::normal::{Noise, Normal, accumulate, set_up_geometry};
 use super::source::Sources;
 use super::thin::Thin;
 use super::unknowns::{Block, Layout, Unknowns};
 use crate::error::{Error, Result};
+use crate::error_motion::Motions;
 use crate::machine::Machine;
 use crate::variation::Varying;
 

@@ -319,6 +319,15 @@ impl<'a> Sources<'a> {
         self.all.iter().any(|s| s.picked.is_some())
     }
 
+    /// Range of every command over all recordings, m or rad.
+    pub fn ranges(&self) -> Vec<(f64, f64)> {
+        let over = |c: usize| {
+            let ranges = self.all.iter().map(|s| s.summary.commands[c]);
+            ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (from, to)| (l.min(from), h.max(to)))
+        };
+        (0..self.machine.commands().len()).map(over).collect()
+    }
+
     /// Samples in all recordings.
     pub fn samples(&self) -> u64 {
         self.all.iter().map(|s| s.summary.samples).sum()

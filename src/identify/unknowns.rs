@@ -2,11 +2,11 @@
 
 use nalgebra::DVector;
 
+use super::set_up_values::SetUpValues;
 use super::source::{Known, Source, Sources};
 use crate::chain::Chain;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::Machine;
-use crate::sensor::SensorState;
 use crate::variation::Varying;
 
 /// What a block of parameters stands for.
@@ -148,9 +148,8 @@ pub(crate) struct Unknowns {
     /// Deviations of all dyads; that of `w` stays zero here.
     pub dh: Vec<Twist<f64>>,
     pub setups: Vec<SetupFrame>,
-    pub tool_points: Vec<Vec3<f64>>,
-    pub zeros: Vec<f64>,
-    pub lengths: Vec<f64>,
+    /// What else is unknown of the set-ups.
+    pub values: SetUpValues,
     /// What deviations depend on.
     pub varying: Varying,
     /// Direction parts by set and dyad.
@@ -173,9 +172,7 @@ impl Unknowns {
         Unknowns {
             dh: vec![zero; machine.dyads().len()],
             setups: sources.frame_unknown.iter().map(frame).collect(),
-            tool_points: vec![Vec3([0.0; 3]); sources.tool_points.len()],
-            zeros: vec![0.0; sources.zeros.len()],
-            lengths: vec![0.0; sources.lengths.len()],
+            values: SetUpValues::zero(sources),
             varying: varying.clone(),
             parts: vec![
                 vec![zero; machine.dyads().len()];
@@ -191,23 +188,6 @@ impl Unknowns {
         let mut chain = Chain::new(machine, &self.dh);
         chain.set_previous_from_frame(machine.w_index(), self.setups[setup].pose());
         chain
-    }
-
-    /// The instrument's own values for a source.
-    pub fn sensor_state(&self, source: &Source) -> SensorState<f64> {
-        let value = |known: Known<f64>, unknowns: &[f64]| match known {
-            Known::Value(value) => value,
-            Known::Unknown(i) => unknowns[i],
-        };
-        SensorState {
-            tool_point_t: match source.tool_point {
-                Known::Value(point) => point,
-                Known::Unknown(i) => self.tool_points[i],
-            },
-            workpiece_point_w: source.recording.header().workpiece_point,
-            length: value(source.length, &self.lengths),
-            zero: value(source.zero, &self.zeros),
-        }
     }
 
     /// The total of a block that has a prior, m and rad.
@@ -239,10 +219,10 @@ impl Unknowns {
                     }
                 }
                 Role::ToolPoint(i) => {
-                    next.tool_points[i] = next.tool_points[i] + Vec3(std::array::from_fn(at));
+                    next.values.tool_points[i] = next.values.tool_points[i] + Vec3(std::array::from_fn(at));
                 }
-                Role::Zero(i) => next.zeros[i] += at(0),
-                Role::Length(i) => next.lengths[i] += at(0),
+                Role::Zero(i) => next.values.zeros[i] += at(0),
+                Role::Length(i) => next.values.lengths[i] += at(0),
                 Role::Part { set, dyad } => {
                     let part = &mut next.parts[set][dyad];
                     *part = *part + Twist::from_array(std::array::from_fn(at));

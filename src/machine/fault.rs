@@ -1,5 +1,7 @@
 //! What can be wrong with a machine, and the mend for each.
 
+use crate::error::Fault;
+
 /// A fault in a machine declaration.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -179,9 +181,8 @@ pub enum MachineFault {
     },
 }
 
-impl MachineFault {
-    /// How to mend it.
-    pub fn mend(&self) -> String {
+impl Fault for MachineFault {
+    fn mend(&self) -> String {
         use MachineFault::*;
         match self {
             EmptyBranch { branch } => {

@@ -5,14 +5,13 @@ use std::fmt;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use crate::calibration::CalibrationForm;
-
 /// Three numbers as RON writes them, `(1, 2, 3)`.
 pub(crate) type Triple = (f64, f64, f64);
 
+/// `C`: what a calibrated file adds; who reads the machine alone takes `IgnoredAny`.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename = "Machine", deny_unknown_fields)]
-pub(crate) struct MachineForm {
+pub(crate) struct MachineForm<C> {
     pub name: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about: Option<String>,
@@ -25,8 +24,8 @@ pub(crate) struct MachineForm {
     pub tool: Vec<DyadForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub side_branches: Vec<SideBranchForm>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub calibration: Option<CalibrationForm>,
+    #[serde(default = "nothing", skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<C>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -129,6 +128,11 @@ pub(crate) struct NcForm {
     pub address: String,
     #[serde(default = "plus")]
     pub sign: i8,
+}
+
+/// `Default` of an option, without asking it of `C`.
+fn nothing<C>() -> Option<C> {
+    None
 }
 
 fn plus() -> i8 {

@@ -3,10 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use serde::de::IgnoredAny;
+
 use super::form::{
     AxisForm, DyadForm, JointBody, JointForm, MachineForm, MoveForm, SideBranchForm, ToleranceForm, Triple,
     UnitsForm,
 };
+use super::number::{Checked, LARGEST, finite, number, to_si, vec_to_si};
 use super::{
     Branch, Drive, Dyad, FileUnits, Joint, JointKind, Machine, MachineFault, MassPoint, NcWord, Placement,
     SideBranch, Tolerance,
@@ -16,20 +19,14 @@ use crate::error::{Error, Result};
 use crate::lie::{Pose, Vec3};
 use crate::units::Unit;
 
-/// A value and the path at which it was found wrong.
-pub(super) type Checked<T> = std::result::Result<T, (String, MachineFault)>;
-
-/// Nothing on a machine is larger than this, in m or rad.
-const LARGEST: f64 = 1e9;
-
 impl Machine {
     /// Reads a machine file.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Ron`] or [`Error::Machine`], the last two with line and column.
+    /// [`Error::File`], or [`Error::Input`] with line and column.
     pub fn open(path: impl AsRef<Path>) -> Result<Machine> {
         let document = Document::open(path)?;
-        let form = document.read()?;
+        let form: MachineForm<IgnoredAny> = document.read()?;
         Machine::from_form(&form).map_err(|e| at_path(&document, e))
     }
 
@@ -39,11 +36,11 @@ impl Machine {
     /// As [`Machine::open`].
     pub fn parse(file: impl AsRef<Path>, text: &str) -> Result<Machine> {
         let document = Document::new(file, text.to_string())?;
-        let form = document.read()?;
+        let form: MachineForm<IgnoredAny> = document.read()?;
         Machine::from_form(&form).map_err(|e| at_path(&document, e))
     }
 
-    pub(crate) fn from_form(form: &MachineForm) -> Checked<Machine> {
+    pub(crate) fn from_form<C>(form: &MachineForm<C>) -> Checked<Machine> {
         let units = form.units.units();
         let branch = |branch: Branch, forms: &[DyadForm]| -> Checked<Vec<Dyad>> {
             let path = |i| format!("{}[{i}]", branch.field());
@@ -189,7 +186,7 @@ impl Machine {
 
 /// A fault with its path becomes an error with its place.
 pub(crate) fn at_path(document: &Document, (path, fault): (String, MachineFault)) -> Error {
-    Error::Machine { place: document.place_of(&path), fault }
+    Error::input(document.place_of(&path), fault)
 }
 
 impl UnitsForm {
@@ -208,35 +205,6 @@ fn unit_word(word: &impl serde::Serialize) -> String {
 
 fn vec3((x, y, z): Triple) -> Vec3<f64> {
     Vec3([x, y, z])
-}
-
-/// A pure number, or one in SI.
-fn number(path: String, value: f64, what: &str) -> Checked<f64> {
-    if value.is_finite() && value.abs() < LARGEST {
-        return Ok(value);
-    }
-    Err((path, MachineFault::NotFinite { what: what.into(), value }))
-}
-
-fn finite(path: &str, (x, y, z): Triple, what: &str) -> Checked<()> {
-    for (i, value) in [x, y, z].into_iter().enumerate() {
-        number(format!("{path}[{i}]"), value, what)?;
-    }
-    Ok(())
-}
-
-/// A number of the file in SI; what is too large is told as it was written.
-fn to_si(path: String, value: f64, unit: Unit, what: &str) -> Checked<f64> {
-    let si = unit.to_si(value);
-    if si.is_finite() && si.abs() < LARGEST {
-        return Ok(si);
-    }
-    Err((path, MachineFault::NotFinite { what: what.into(), value }))
-}
-
-fn vec_to_si(path: &str, (x, y, z): Triple, unit: Unit, what: &str) -> Checked<Vec3<f64>> {
-    let component = |i: usize, value| to_si(format!("{path}[{i}]"), value, unit, what);
-    Ok(Vec3([component(0, x)?, component(1, y)?, component(2, z)?]))
 }
 
 /// The nearest number that a file can say in `unit`, without the dust of rounding: 1e-15 m or rad at most.

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::read::{Checked, check_dyad, usable_name};
+use super::number::Checked;
+use super::read::{check_dyad, usable_name};
 use super::{Dyad, Joint, JointKind, Machine, MachineFault};
 
 /// Frames and joints that stand on a frame of the machine and weigh on it; nothing of them is measured or identified. Their joints are

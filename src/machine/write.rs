@@ -1,6 +1,7 @@
 //! From a machine to text; reading it back gives the same machine.
 
 use ron::ser::PrettyConfig;
+use serde::Serialize;
 
 use super::form::{
     AngleUnit, AxisForm, DyadForm, JointBody, JointForm, LengthUnit, MachineForm, NcForm, SideBranchForm,
@@ -14,10 +15,10 @@ use crate::units::Unit;
 impl Machine {
     /// The machine as a RON text in its own units.
     pub fn to_ron(&self) -> String {
-        to_text(&self.to_form())
+        to_text(&self.to_form::<()>())
     }
 
-    pub(crate) fn to_form(&self) -> MachineForm {
+    pub(crate) fn to_form<C>(&self) -> MachineForm<C> {
         let units = self.units;
         let forms = |dyads: &[Dyad]| dyads.iter().map(|d| dyad(d, units)).collect();
         let (workpiece, tool) = self.dyads.split_at(self.workpiece_count);
@@ -43,7 +44,7 @@ impl Machine {
 }
 
 /// A form as the text that is written to files: one dyad a line, numbers as short as they can be.
-pub(crate) fn to_text(form: &MachineForm) -> String {
+pub(crate) fn to_text<C: Serialize>(form: &MachineForm<C>) -> String {
     let config = PrettyConfig::new()
         .depth_limit(2)
         .struct_names(false)

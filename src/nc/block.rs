@@ -216,7 +216,7 @@ impl Block {
 
     /// A fault at a byte of this line.
     pub(super) fn fault(&self, byte: usize, fault: NcFault) -> Error {
-        Error::Nc { place: self.place(byte), fault: Box::new(fault) }
+        Error::input(self.place(byte), fault)
     }
 
     /// Column in characters, from 1.

@@ -1,5 +1,7 @@
 //! What can be wrong with an NC program, and the mend for each.
 
+use crate::error::Fault;
+
 /// A fault in an NC program, or in what should be written into one.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -48,9 +50,8 @@ pub enum NcFault {
     },
 }
 
-impl NcFault {
-    /// How to mend it.
-    pub fn mend(&self) -> String {
+impl Fault for NcFault {
+    fn mend(&self) -> String {
         use NcFault::*;
         match self {
             LineTooLong { .. } => "write one block per line; is this an NC program at all?".into(),

@@ -124,10 +124,7 @@ impl<R: BufRead> Program<R> {
             let end = part.iter().position(|b| *b == b'\n').map_or(part.len(), |i| i + 1);
             if line.len() + end > LONGEST_LINE {
                 let place = Place::at(&self.file, self.read + 1, 0);
-                return Err(Error::Nc {
-                    place,
-                    fault: Box::new(NcFault::LineTooLong { limit: LONGEST_LINE }),
-                });
+                return Err(Error::input(place, NcFault::LineTooLong { limit: LONGEST_LINE }));
             }
             line.extend_from_slice(&part[..end]);
             self.source.consume(end);

@@ -1,5 +1,6 @@
 //! What can be wrong with a recording, and the mend for each.
 
+use crate::error::Fault;
 use crate::units::{Quantity, UNITS, Unit};
 
 /// A fault in a recording. Texts quoted from the file are cut short and shown without control characters.
@@ -323,9 +324,8 @@ pub enum RecordingFault {
     },
 }
 
-impl RecordingFault {
-    /// How to mend it.
-    pub fn mend(&self) -> String {
+impl Fault for RecordingFault {
+    fn mend(&self) -> String {
         use RecordingFault::*;
         match self {
             Empty => "a recording holds lines `# key: value`, one header row and rows of numbers".into(),

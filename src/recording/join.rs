@@ -33,7 +33,7 @@ pub struct Joined {
 /// are there once. Both are taken as they are written, whatever machine they are of.
 ///
 /// # Errors
-/// [`Error::File`], or [`Error::Recording`] with line and column: rows that are not as many, no column that changes and is the same in both,
+/// [`Error::File`], or [`Error::Input`] with line and column: rows that are not as many, no column that changes and is the same in both,
 /// what is no number.
 pub fn join(own: &Path, other: &Path, name: &str) -> Result<Joined> {
     if !is_usable_name(name) {

@@ -4,8 +4,9 @@
 use nalgebra::{DVector, Vector6};
 use serde::Serialize;
 
-use super::state::{Places, State};
+use super::state::State;
 use crate::chain::Sweep;
+use crate::identify::Places;
 use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{Branch, Joint, JointKind, Machine};
 
@@ -128,12 +129,12 @@ pub(super) fn stepped(
 ) -> State {
     let part = |at: usize| Twist::from_array(std::array::from_fn(|k| step[at + k]));
     let mut next = state.clone();
-    for (i, point) in next.tool_points.iter_mut().enumerate() {
+    for (i, point) in next.set_ups.tool_points.iter_mut().enumerate() {
         let at = places.tool_point(i);
         *point = *point + Vec3([step[at], step[at + 1], step[at + 2]]);
     }
-    next.zeros.iter_mut().enumerate().for_each(|(i, z)| *z += step[places.zero(i)]);
-    next.lengths.iter_mut().enumerate().for_each(|(i, l)| *l += step[places.length(i)]);
+    next.set_ups.zeros.iter_mut().enumerate().for_each(|(i, z)| *z += step[places.zero(i)]);
+    next.set_ups.lengths.iter_mut().enumerate().for_each(|(i, l)| *l += step[places.length(i)]);
     let (w, t) = (machine.w_index(), machine.t_index());
     if !form.is_global() {
         let moved = |branch: Branch, link: Pose<f64>, d: Twist<f64>| match (form, branch) {

@@ -19,8 +19,7 @@ use crate::lie::{Pose, Twist};
 use crate::machine::{Machine, Tolerance};
 use crate::recording::Recording;
 use crate::rms::Rms;
-use stream::Opened;
-use unknowns::{Block, FrameW, Role, Values};
+use unknowns::{Block, FrameW, Opened, Role, Values};
 
 /// Standard deviations of one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]

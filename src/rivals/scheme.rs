@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use super::Fitted;
 use super::form::{Form, Rows, stepped};
-use super::state::{Places, State};
+use super::state::State;
 use super::step::{Step, Triangle};
 use crate::error::{Error, Result};
-use crate::identify::{Sources, Stop};
+use crate::identify::{Places, Sources, Stop};
 use crate::lie::{Mat3, Pose, Twist, Vec3};
 use crate::machine::Machine;
 use crate::recording::Recording;
@@ -94,7 +94,7 @@ impl Scheme {
         let instruments: Vec<_> = (sources.all.iter())
             .map(|s| {
                 let rows = Rows::new(self.form, machine, places, state, s.setup);
-                (state.chain(machine, s.setup), rows, state.sensor_state(s))
+                (state.chain(machine, s.setup), rows, state.set_ups.sensor_state(s))
             })
             .collect();
         sources.pass(

@@ -3,11 +3,10 @@
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
 use crate::error::Result;
-use crate::identify::{Known, Loss, Source, Sources, fit_setup};
+use crate::identify::{Loss, SetUpValues, Sources, fit_setup};
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::Machine;
 use crate::recording::Recording;
-use crate::sensor::SensorState;
 use crate::variation::CONSTANT;
 
 /// Present values. A product of exponentials in the base frame is kept as a chain too: a unit twist is its joint's twist in a frame
@@ -18,63 +17,8 @@ pub(super) struct State {
     pub links: Vec<Pose<f64>>,
     /// Frame `w` in the frame before it, by set-up.
     pub frames_w: Vec<Pose<f64>>,
-    pub tool_points: Vec<Vec3<f64>>,
-    pub zeros: Vec<f64>,
-    pub lengths: Vec<f64>,
-}
-
-/// Where the parameters of a scheme stand: six per dyad in machine order (those of `w` are the first set-up's), six per further
-/// set-up, then tool points, zeros and lengths.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Places {
-    dyads: usize,
-    w: usize,
-    setups: usize,
-    tool_points: usize,
-    zeros: usize,
-    lengths: usize,
-}
-
-impl Places {
-    pub fn new(machine: &Machine, sources: &Sources) -> Self {
-        Places {
-            dyads: machine.dyads().len(),
-            w: machine.w_index(),
-            setups: sources.setups.len(),
-            tool_points: sources.tool_points.len(),
-            zeros: sources.zeros.len(),
-            lengths: sources.lengths.len(),
-        }
-    }
-
-    pub fn frame_w(&self, setup: usize) -> usize {
-        if setup == 0 { 6 * self.w } else { 6 * (self.dyads + setup - 1) }
-    }
-
-    fn behind_frames(&self) -> usize {
-        6 * (self.dyads + self.setups - 1)
-    }
-
-    pub fn tool_point(&self, i: usize) -> usize {
-        self.behind_frames() + 3 * i
-    }
-
-    pub fn zero(&self, i: usize) -> usize {
-        self.behind_frames() + 3 * self.tool_points + i
-    }
-
-    pub fn length(&self, i: usize) -> usize {
-        self.zero(self.zeros) + i
-    }
-
-    pub fn len(&self) -> usize {
-        self.length(self.lengths)
-    }
-
-    /// Whether a parameter is a translation rather than a turn.
-    pub fn is_translation(&self, k: usize) -> bool {
-        k >= self.behind_frames() || k % 6 < 3
-    }
+    /// What else is unknown of the set-ups.
+    pub set_ups: SetUpValues,
 }
 
 /// The machine as declared, with the set-ups that the recordings declare unknown found.
@@ -91,9 +35,7 @@ impl State {
         let mut state = State {
             frames_w: vec![links[machine.w_index()]; sources.setups.len()],
             links,
-            tool_points: vec![Vec3([0.0; 3]); sources.tool_points.len()],
-            zeros: vec![0.0; sources.zeros.len()],
-            lengths: vec![0.0; sources.lengths.len()],
+            set_ups: SetUpValues::zero(sources),
         };
         let given = sources.tool_points.is_empty() && sources.zeros.is_empty() && sources.lengths.is_empty();
         if given && !sources.frame_unknown.contains(&true) {
@@ -107,16 +49,16 @@ impl State {
             }
         }
         for (i, name) in sources.tool_points.iter().enumerate() {
-            state.tool_points[i] =
+            state.set_ups.tool_points[i] =
                 placed.tool_points().find(|(known, _)| known == name).map_or(Vec3([0.0; 3]), |p| p.1);
         }
         for (i, (s, of)) in sources.zeros.iter().enumerate() {
             let own = placed.zeros().find(|(setup, known, _)| *setup == sources.setups[*s] && known == of);
-            state.zeros[i] = own.map_or(0.0, |z| z.2);
+            state.set_ups.zeros[i] = own.map_or(0.0, |z| z.2);
         }
         for (i, s) in sources.lengths.iter().enumerate() {
             let own = placed.lengths().find(|(setup, _)| *setup == sources.setups[*s]);
-            state.lengths[i] = own.map_or(0.0, |l| l.1);
+            state.set_ups.lengths[i] = own.map_or(0.0, |l| l.1);
         }
         Ok(state)
     }
@@ -129,23 +71,6 @@ impl State {
         }
         chain.set_previous_from_frame(machine.w_index(), self.frames_w[setup]);
         chain
-    }
-
-    /// The instrument's own values for a source.
-    pub fn sensor_state(&self, source: &Source) -> SensorState<f64> {
-        let value = |known: Known<f64>, unknowns: &[f64]| match known {
-            Known::Value(value) => value,
-            Known::Unknown(i) => unknowns[i],
-        };
-        SensorState {
-            tool_point_t: match source.tool_point {
-                Known::Value(point) => point,
-                Known::Unknown(i) => self.tool_points[i],
-            },
-            workpiece_point_w: source.recording.header().workpiece_point,
-            length: value(source.length, &self.lengths),
-            zero: value(source.zero, &self.zeros),
-        }
     }
 
     /// The machine with what was found: each frame's `log(M⁻¹ E)`.
@@ -162,11 +87,12 @@ impl State {
         let setup = |s: usize| sources.setups[s].clone();
         calibrated.setups = (0..sources.setups.len()).map(|s| (setup(s), self.frames_w[s])).collect();
         calibrated.tool_points =
-            sources.tool_points.iter().cloned().zip(self.tool_points.iter().copied()).collect();
-        calibrated.zeros =
-            (sources.zeros.iter().zip(&self.zeros)).map(|((s, of), z)| (setup(*s), of.clone(), *z)).collect();
+            sources.tool_points.iter().cloned().zip(self.set_ups.tool_points.iter().copied()).collect();
+        calibrated.zeros = (sources.zeros.iter().zip(&self.set_ups.zeros))
+            .map(|((s, of), z)| (setup(*s), of.clone(), *z))
+            .collect();
         calibrated.lengths =
-            sources.lengths.iter().zip(&self.lengths).map(|(s, l)| (setup(*s), *l)).collect();
+            sources.lengths.iter().zip(&self.set_ups.lengths).map(|(s, l)| (setup(*s), *l)).collect();
         calibrated
     }
 }

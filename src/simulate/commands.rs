@@ -41,7 +41,7 @@ impl CommandTable {
     /// Opens a table and reads its header. `rate`: samples a second where there is no column `t`.
     ///
     /// # Errors
-    /// [`Error::File`], or [`Error::Simulation`] with line and column for a column that cannot be used or a joint without one.
+    /// [`Error::File`], or [`Error::Input`] with line and column for a column that cannot be used or a joint without one.
     pub fn open(path: impl AsRef<Path>, machine: &Machine, rate: f64) -> Result<CommandTable> {
         let path = path.as_ref().to_path_buf();
         let mut table = CommandTable {
@@ -96,11 +96,7 @@ impl CommandTable {
         message: impl Into<String>,
         mend: impl Into<String>,
     ) -> Error {
-        Error::Simulation {
-            place: Place::at(&self.path, line, column),
-            message: message.into(),
-            mend: mend.into(),
-        }
+        Error::mistake(Place::at(&self.path, line, column), message, mend)
     }
 
     fn lines(&self) -> Result<impl Iterator<Item = Result<(usize, String)>> + Send + use<>> {
@@ -114,11 +110,11 @@ impl CommandTable {
                 Ok(0) => None,
                 Ok(_) => match String::from_utf8(bytes) {
                     Ok(text) => Some(Ok((number, text))),
-                    Err(_) => Some(Err(Error::Simulation {
-                        place: Place::at(&path, number, 0),
-                        message: "text is not UTF-8".into(),
-                        mend: "save the table as plain text in UTF-8".into(),
-                    })),
+                    Err(_) => Some(Err(Error::mistake(
+                        Place::at(&path, number, 0),
+                        "text is not UTF-8",
+                        "save the table as plain text in UTF-8",
+                    ))),
                 },
                 Err(e) => Some(Err(Error::file(&path, e))),
             }

@@ -83,7 +83,7 @@ impl Faults {
     /// Reads a faults file for a machine.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Ron`] or [`Error::Simulation`], the last two with line and column.
+    /// [`Error::File`], or [`Error::Input`] with line and column.
     pub fn open(path: impl AsRef<Path>, machine: &Machine) -> Result<Faults> {
         Faults::from_document(&Document::open(path)?.guided(GUIDE), machine)
     }
@@ -98,11 +98,9 @@ impl Faults {
 
     fn from_document(document: &Document, machine: &Machine) -> Result<Faults> {
         let form: FaultsForm = document.read()?;
-        Reader { machine, form: &form }.faults().map_err(|Fail { path, message, mend }| Error::Simulation {
-            place: document.place_of(&path),
-            message,
-            mend,
-        })
+        Reader { machine, form: &form }
+            .faults()
+            .map_err(|Fail { path, message, mend }| Error::mistake(document.place_of(&path), message, mend))
     }
 }
 

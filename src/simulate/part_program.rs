@@ -128,11 +128,7 @@ impl PartProgram {
     }
 
     fn wrong(&self, line: usize, message: impl Into<String>, mend: impl Into<String>) -> Error {
-        Error::Simulation {
-            place: Place::at(&self.path, line, 0),
-            message: message.into(),
-            mend: mend.into(),
-        }
+        Error::mistake(Place::at(&self.path, line, 0), message.into(), mend.into())
     }
 }
 

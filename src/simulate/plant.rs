@@ -431,16 +431,18 @@ impl Plant {
                     let by = coefficient * values.next().unwrap_or(0.0);
                     match part.slot {
                         Slot::Before(j) => touch(&mut state.deviations, j, part.direction.times(by)),
-                        Slot::Carried(j) => state.behind[j] = state.behind[j] + part.direction.times(by),
-                        Slot::Reading(i) => {
+                        Slot::After(j) => state.behind[j] = state.behind[j] + part.direction.times(by),
+                        Slot::Reading => {
                             let kind = effect.and_then(|e| e.instrument.as_deref());
-                            state.added.push((i, kind.map(Arc::from), by));
+                            let weights = part.direction.to_array().into_iter().enumerate();
+                            let added = weights.filter(|(_, weight)| *weight != 0.0);
+                            state.added.extend(added.map(|(i, w)| (i, kind.map(Arc::from), w * by)));
                         }
                     }
                 }
             }
             for part in varying.terms.iter().flat_map(|term| &term.parts) {
-                if let Slot::Carried(j) = part.slot {
+                if let Slot::After(j) = part.slot {
                     state.chain.set_carried(j, Pose::exp(state.behind[j]));
                 }
             }

@@ -1,25 +1,14 @@
 //! Streams of samples: what the head of a recording adds to the state.
 
-use super::unknowns::{Block, FrameW, Role};
+use super::unknowns::{Block, FrameW, Opened, Role};
 use super::{Kalman, Stream};
 use crate::error::{Error, Result};
 use crate::identify::{Known, channel};
-use crate::lie::{Twist, Vec3};
+use crate::lie::Twist;
 use crate::machine::{JointKind, Tolerance};
 use crate::recording::{Header, NominalLength, ToolPoint};
 use crate::sensor::Sensor;
 use crate::units::Quantity;
-
-#[derive(Clone, Debug)]
-pub(super) struct Opened {
-    pub sensor: Sensor,
-    pub frame: usize,
-    pub tool_point: Known<Vec3<f64>>,
-    pub workpiece_point: Vec3<f64>,
-    pub zero: Known<f64>,
-    pub length: Known<f64>,
-    pub sigmas: Vec<f64>,
-}
 
 impl Kalman {
     /// Adds unknowns to the state, at their scale's standard deviation.

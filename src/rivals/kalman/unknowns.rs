@@ -3,7 +3,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Kalman;
-use super::stream::Opened;
 use crate::chain::{Chain, deviation_jacobian};
 use crate::identify::Known;
 use crate::lie::{Pose, Twist, Vec3};
@@ -45,6 +44,18 @@ pub(super) struct Values {
     /// Set-up, channel, value; `None` until the first reading.
     pub zeros: Vec<(String, String, Option<f64>)>,
     pub lengths: Vec<(String, Option<f64>)>,
+}
+
+/// A stream of samples, and which unknowns its readings depend on.
+#[derive(Clone, Debug)]
+pub(super) struct Opened {
+    pub sensor: Sensor,
+    pub frame: usize,
+    pub tool_point: Known<Vec3<f64>>,
+    pub workpiece_point: Vec3<f64>,
+    pub zero: Known<f64>,
+    pub length: Known<f64>,
+    pub sigmas: Vec<f64>,
 }
 
 impl Kalman {

@@ -3,28 +3,24 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::evaluator::{EXTRAS, Moment};
-use super::source::{Known, Sources};
-use super::stretch::Stretch;
-use super::unknowns::{Layout, Role, Unknowns};
-use super::{
-    Evaluator, Fit, Info, Model, Options, Placed, Problem, enough_for_setups, enough_to_start, fit,
-    information, is_of_setup, place, settle,
-};
 use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
+use crate::identify::{
+    EXTRAS, Evaluator, Fit, Known, Layout, Moment, Options, Places, Role, Source, Sources, Stretch, Unknowns,
+    optimum, sources,
+};
 use crate::machine::Machine;
 use crate::motion::Motion;
 use crate::recording::{Chunk, Recording, step_of};
 use crate::units::Quantity;
-use crate::variation::{Term, Varying};
+use crate::variation::{CONSTANT, Term};
 
 /// More samples than these in all are thinned out evenly.
 const MOST_SAMPLES: u64 = 40_000;
 
 /// Readings of one recording among the rows.
 #[derive(Clone, Debug)]
-pub(crate) struct Span {
+pub(super) struct Span {
     /// File name.
     pub label: String,
     /// Name of its set-up.
@@ -42,7 +38,7 @@ pub(crate) struct Span {
 }
 
 /// Rows of all recordings, one per scalar reading, sample by sample.
-pub(crate) struct Linear {
+pub(super) struct Linear {
     pub fit: Fit,
     pub spans: Vec<Span>,
     /// Measured less modelled, m or rad; with what is in `acting`.
@@ -70,7 +66,7 @@ pub(crate) struct Linear {
 }
 
 /// Where a machine is to be linearised anew.
-pub(crate) struct Displaced {
+pub(super) struct Displaced {
     /// What is to be added to everything constant, in units of [`Linear::constant`].
     pub constants: Vec<f64>,
     /// What deviations depend on besides, on the machine and not on the readings.
@@ -89,32 +85,16 @@ const FREE: f64 = 10.0;
 const ENOUGH: usize = 4096;
 
 /// Calibrates with constant deviations and takes the rows there; `dead_bands` by dyad, m or rad.
-pub(crate) fn linear(
+pub(super) fn linear(
     machine: &Machine,
     recordings: &[Recording],
     options: Options,
     dead_bands: &[f64],
     progress: &dyn Fn(&str),
 ) -> Result<Linear> {
-    let (varying, model) = (Varying::default(), Model::default());
-    let sources = Sources::new(recordings, machine, &varying, &model.dead_bands, progress)?;
-    enough_to_start(machine, &sources)?;
-    enough_for_setups(&sources)?;
-    let layout = Layout::new(machine, &sources, &varying, 1.0);
-    let mut problem = Problem::new(machine, &sources, &layout, &varying, is_of_setup);
-    problem.progress = progress;
-    let start = Unknowns::nominal(machine, &sources, &varying);
-    let Placed { solution: placed, noise, thin } = place(&mut problem, start)?;
-    let (nominal, declared) = (placed.normal.tallies.clone(), placed.unknowns.clone());
-    problem.loss = options.loss;
-    problem.prior = options.prior;
-    problem.free = vec![true; layout.len];
-    let found = settle(&problem, options.solver, placed.unknowns, noise)?;
-    let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
-    let information = Info::new(&found.solution.normal.matrix, &layout, problem.prior, open);
-    let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
+    let found = optimum(machine, recordings, options, progress)?;
     progress("taking rows");
-    rows(machine, &sources, found.solution.unknowns, fit, dead_bands, &[])
+    rows(machine, &found.sources, found.unknowns, found.fit, dead_bands, &[])
 }
 
 impl Linear {
@@ -134,9 +114,8 @@ impl Linear {
         dead_bands: &[f64],
         to: &Displaced,
     ) -> Result<Linear> {
-        let varying = Varying::default();
-        let sources = Sources::new(recordings, machine, &varying, &Model::default().dead_bands, &|_| {})?;
-        let layout = Layout::new(machine, &sources, &varying, 1.0);
+        let sources = sources(machine, recordings, &|_| {})?;
+        let layout = Layout::new(machine, &sources, &CONSTANT, 1.0);
         let columns = Columns::new(machine, &sources);
         let mut step = DVector::zeros(layout.len);
         for block in &layout.blocks {
@@ -149,54 +128,44 @@ impl Linear {
         unknowns.varying.terms.clone_from(&to.terms);
         unknowns.coefficients.clone_from(&to.coefficients);
         let mut displaced = rows(machine, &sources, unknowns, self.fit.clone(), dead_bands, &to.features)?;
-        displaced.unknowns.varying = varying;
+        displaced.unknowns.varying = CONSTANT.clone();
         displaced.unknowns.coefficients.clear();
         Ok(displaced)
     }
 }
 
-/// Columns of everything constant: six of each dyad, that of `w` being of the first set-up, six of the frame of every further one, and
-/// of tool points, zeros and lengths that are unknown.
+/// Columns of everything constant, in their places, and how much of each is possible.
 struct Columns {
-    dyads: usize,
+    places: Places,
     w: usize,
     /// By set-up.
     frame_unknown: Vec<bool>,
-    tool_points: usize,
-    zeros: usize,
-    lengths: usize,
     /// By dyad, six each.
     tolerances: Vec<f64>,
 }
 
 impl Columns {
     fn new(machine: &Machine, sources: &Sources) -> Self {
-        let dyads = machine.dyads().len();
         Columns {
-            dyads,
+            places: Places::new(machine, sources),
             w: machine.w_index(),
             frame_unknown: sources.frame_unknown.clone(),
-            tool_points: sources.tool_points.len(),
-            zeros: sources.zeros.len(),
-            lengths: sources.lengths.len(),
-            tolerances: (0..dyads).flat_map(|j| machine.tolerance(j).to_array()).collect(),
+            tolerances: (0..machine.dyads().len()).flat_map(|j| machine.tolerance(j).to_array()).collect(),
         }
     }
 
     fn count(&self) -> usize {
-        self.first(Role::Length(self.lengths))
+        self.places.len()
     }
 
     /// First column of a block; what varies has none and stands behind the last.
     fn first(&self, role: Role) -> usize {
-        let behind = 6 * (self.dyads + self.frame_unknown.len() - 1);
         match role {
             Role::Dyad(j) => 6 * j,
-            Role::Setup(0) => 6 * self.w,
-            Role::Setup(s) => 6 * (self.dyads + s - 1),
-            Role::ToolPoint(i) => behind + 3 * i,
-            Role::Zero(i) => behind + 3 * self.tool_points + i,
-            Role::Length(i) => behind + 3 * self.tool_points + self.zeros + i,
+            Role::Setup(s) => self.places.frame_w(s),
+            Role::ToolPoint(i) => self.places.tool_point(i),
+            Role::Zero(i) => self.places.zero(i),
+            Role::Length(i) => self.places.length(i),
             Role::Part { .. } | Role::Term(_) => self.count(),
         }
     }
@@ -222,7 +191,7 @@ fn rows(
 ) -> Result<Linear> {
     let (dyads, columns) = (machine.dyads().len(), Columns::new(machine, sources));
     let stride = sources.samples().div_ceil(MOST_SAMPLES).max(1);
-    let kept = |source: &super::source::Source| source.summary.samples.div_ceil(stride) as usize;
+    let kept = |source: &Source| source.summary.samples.div_ceil(stride) as usize;
     let count: usize = sources.all.iter().map(|s| kept(s) * s.sensor.reading_count()).sum();
     let mut linear = Linear {
         fit,

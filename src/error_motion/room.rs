@@ -7,11 +7,9 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::source::Sources;
-use crate::error_motion::{ErrorMotions, HARMONICS, JointMotion, direction_of, harmonics};
+use super::{ErrorMotions, HARMONICS, JointMotion, direction_of, harmonics};
 use crate::lie::Twist;
 use crate::machine::{JointKind, Machine};
-use crate::variation::Directions;
 
 /// Functions of one joint and component: cosine and sine of every harmonic.
 const FUNCTIONS: usize = 2 * HARMONICS;
@@ -41,18 +39,21 @@ struct Room {
 }
 
 impl Motions {
-    /// Room for `share` of every joint's tolerance; none for 0. `directions`: of whose axes the play may vary.
-    pub fn new(machine: &Machine, sources: &Sources, share: f64, directions: Option<&Directions>) -> Self {
+    /// Room for `share` of every joint's tolerance; none for 0. `seen`: range of every command, m or rad; `play`: standard deviation of
+    /// half the play of the joint of a dyad, m or rad, where the model has some.
+    pub fn new(
+        machine: &Machine,
+        seen: &[(f64, f64)],
+        share: f64,
+        play: impl Fn(usize) -> Option<f64>,
+    ) -> Self {
         if share <= 0.0 {
             return Motions::default();
         }
         let seen = |j: usize| {
             let terms = machine.drive(j).map_or(&[][..], |d| &d.terms);
             terms.iter().fold((0.0, 0.0), |(low, high), (c, factor)| {
-                let ranges = sources.all.iter().map(|s| s.summary.commands[*c]);
-                let (l, h) =
-                    ranges.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), (a, b)| (l.min(a), h.max(b)));
-                let (a, b) = (factor * l, factor * h);
+                let (a, b) = (factor * seen[*c].0, factor * seen[*c].1);
                 (low + a.min(b), high + a.max(b))
             })
         };
@@ -64,7 +65,7 @@ impl Motions {
                 JointKind::Prismatic => (low, 2.0 * (high - low)),
             };
             let size = machine.tolerance(j).to_array().map(|t| share * t);
-            let play = directions.and_then(|directions| directions.play(machine, j)).unwrap_or(0.0);
+            let play = play(j).unwrap_or(0.0);
             moves.then_some(Room { dyad: j, from, period, size, play: PLAY_VARIES * play })
         };
         Motions { joints: machine.joints().filter_map(room).collect() }

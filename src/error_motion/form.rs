@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Triple, checked, place};
-use crate::error_motion::{ErrorMotions, HARMONICS, JointMotion};
+use super::{ErrorMotions, HARMONICS, JointMotion};
 use crate::lie::Twist;
-use crate::machine::{JointKind, Machine, MachineFault, in_unit};
+use crate::machine::{
+    Checked, JointKind, Machine, MachineFault, OF_CALIBRATION, Triple, in_unit, number, vec_to_si,
+};
 use crate::units::Unit;
 
 /// The error motion of one joint, in the file's units.
@@ -36,7 +37,7 @@ fn unit(machine: &Machine, kind: JointKind) -> Unit {
 }
 
 /// As the file has them.
-pub(super) fn forms(machine: &Machine, motions: &ErrorMotions) -> Vec<MotionForm> {
+pub(crate) fn forms(machine: &Machine, motions: &ErrorMotions) -> Vec<MotionForm> {
     let units = machine.units();
     let twist = |t: &Twist<f64>| TwistForm { v: in_unit(t.v, units.length), w: in_unit(t.w, units.angle) };
     let form = |motion: &JointMotion| {
@@ -55,8 +56,9 @@ pub(super) fn forms(machine: &Machine, motions: &ErrorMotions) -> Vec<MotionForm
 }
 
 /// Back from the file.
-pub(super) fn read(forms: &[MotionForm], machine: &Machine) -> Result<ErrorMotions, (String, MachineFault)> {
+pub(crate) fn read(forms: &[MotionForm], machine: &Machine) -> Checked<ErrorMotions> {
     let units = machine.units();
+    let checked = |path, value| number(path, value, OF_CALIBRATION);
     let mut joints: Vec<JointMotion> = Vec::new();
     for (i, form) in forms.iter().enumerate() {
         let path = format!("calibration.error_motions[{i}]");
@@ -80,8 +82,8 @@ pub(super) fn read(forms: &[MotionForm], machine: &Machine) -> Result<ErrorMotio
             let mut twists = [Twist::zero(0.0); HARMONICS];
             for (h, (twist, form)) in twists.iter_mut().zip(all).enumerate() {
                 *twist = Twist::new(
-                    place(&format!("{path}.{field}[{h}].v"), form.v, units.length)?,
-                    place(&format!("{path}.{field}[{h}].w"), form.w, units.angle)?,
+                    vec_to_si(&format!("{path}.{field}[{h}].v"), form.v, units.length, OF_CALIBRATION)?,
+                    vec_to_si(&format!("{path}.{field}[{h}].w"), form.w, units.angle, OF_CALIBRATION)?,
                 );
             }
             Ok(twists)
