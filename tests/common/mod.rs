@@ -1,8 +1,6 @@
 //! What several tests need.
 #![allow(dead_code)]
 
-pub mod sets;
-
 use std::path::{Path, PathBuf};
 
 use kincal::Machine;
@@ -37,14 +35,12 @@ pub fn are_the_same_but_for_rounding(one: &[f64], other: &[f64]) {
     }
 }
 
-/// A file of the folder beside the project; `None`, with a message, where it is missing.
-pub fn shared(path: &str) -> Option<PathBuf> {
-    let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
-    if full.exists() {
-        return Some(full);
-    }
-    println!("skipped: ../shared/{path} is not here");
-    None
+/// A file of the data sets beside the project, or where `KINCAL_DATA` says. Only tests that are ignored for that reason ask for one.
+pub fn data(path: &str) -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared");
+    let full = std::env::var_os("KINCAL_DATA").map_or_else(beside, PathBuf::from).join(path);
+    assert!(full.exists(), "{path} of the data sets is not here: KINCAL_DATA=FOLDER says where they are");
+    full
 }
 
 /// Noise of unit variance; the sum of four even numbers is near enough to normal.

@@ -1,0 +1,178 @@
+//! `kincal compensate` as a user meets it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use crate::common;
+use kincal::CalibratedMachine;
+use kincal::compensate::Setup;
+use kincal::identify::{Model, Options, calibrate_model};
+use kincal::recording::Recording;
+use kincal::sensor::Sensor;
+use kincal::simulate::{
+    Claims, CommandTable, Faults, Instrument, Plant, Run, Style, random_deviations, recordings,
+};
+use kincal::variation::{Directions, Varying};
+
+/// A folder of its own for one test, with a calibrated machine and a program in it.
+struct Bench(PathBuf);
+
+impl Bench {
+    fn new(name: &str, program: &str) -> Bench {
+        let folder = std::env::temp_dir().join(format!("kincal_compensate_{name}_{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let machine = common::machine("ac_table_tilting");
+        let deviations = random_deviations(&machine, 1.0, 6);
+        let calibrated = CalibratedMachine::nominal(machine).with_deviations(deviations);
+        std::fs::write(folder.join("machine.ron"), calibrated.to_ron()).expect("writable");
+        std::fs::write(folder.join("part.nc"), program).expect("writable");
+        Bench(folder)
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
+        command.current_dir(&self.0).arg("compensate").arg("machine.ron").arg("part.nc").args(arguments);
+        command.output().expect("the program runs")
+    }
+
+    fn read(&self, name: &str) -> Option<String> {
+        std::fs::read_to_string(self.0.join(name)).ok()
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+const PROGRAM: &str = "G21 G90\nG0 X10 Y20 Z30 A40 C50\nG1 X60 F500 (cut)\nM30\n";
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+#[test]
+fn the_corrected_program_and_its_report_are_written() {
+    let bench = Bench::new("whole", PROGRAM);
+    let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let said = text(&out.stdout);
+    for part in ["4 lines, 2 moves", "axis words corrected", "largest correction: tip", "written to out.nc"] {
+        assert!(said.contains(part), "{part}\n{said}");
+    }
+    let written = bench.read("out.nc").expect("written");
+    assert!(written.contains(" F500 (cut)\nM30\n") && written != PROGRAM, "{written}");
+    let json: serde_json::Value =
+        serde_json::from_str(&bench.read("out.json").expect("written")).expect("JSON");
+    assert_eq!(json["moves"], 2);
+    assert!(json["largest_left_m"]["value"].as_f64().expect("a number") < 1e-6);
+    assert!(json["unseen"].is_null() && json["singular"]["count"] == 0);
+}
+
+#[test]
+fn a_refused_program_leaves_nothing_behind() {
+    let bench = Bench::new("refused", "G0 X1 Y2 Z3 A4 C5\nG2 X5 I2 J1\n");
+    let out = bench.run(&["-o", "out.nc"]);
+    assert_eq!(out.status.code(), Some(1));
+    let said = text(&out.stderr);
+    assert!(said.contains("part.nc:2:") && said.contains("  = "), "{said}");
+    assert!(bench.read("out.nc").is_none());
+    let left = std::fs::read_dir(&bench.0).expect("readable").count();
+    assert_eq!(left, 2);
+}
+
+#[test]
+fn a_program_is_not_corrected_onto_itself() {
+    let bench = Bench::new("itself", PROGRAM);
+    let out = bench.run(&["-o", "part.nc"]);
+    assert_eq!(out.status.code(), Some(1));
+    assert!(text(&out.stderr).contains("one of the inputs"), "{}", text(&out.stderr));
+    assert_eq!(bench.read("part.nc").as_deref(), Some(PROGRAM));
+}
+
+#[test]
+fn a_tolerance_needs_its_unit() {
+    let bench = Bench::new("unit", PROGRAM);
+    let out = bench.run(&["--arcs", "0.002"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("unit"), "{}", text(&out.stderr));
+}
+
+#[test]
+fn the_set_up_of_the_documents_reads_as_it_stands() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/compensate.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    let examples: Vec<&str> =
+        page.split("```ron\n").skip(1).filter_map(|part| part.split("```").next()).collect();
+    assert_eq!(examples.len(), 1);
+    for example in examples {
+        Setup::parse("docs/compensate.md", example).unwrap_or_else(|e| panic!("{e}: {}", e.mend()));
+    }
+    let wrong = Setup::parse("setup.ron", "Setup(tool: {})").expect_err("a misspelt field");
+    assert!(wrong.to_string().starts_with("setup.ron:1:"), "{wrong}");
+}
+
+#[test]
+fn reversals_and_directions_never_seen_are_told_with_their_lines() {
+    let bench =
+        Bench::new("pieces", "G21 G90\nG0 X10 Y20 Z30 A40 C50\nG1 X60 F500\nC40\nA30\nA50\nC41\nM30\n");
+    let machine = common::machine("ac_table_tilting");
+    let faults = "Faults(units: (length: um, angle: urad), backlash: [(joint: \"a\", width: 60), (joint: \"c\", width: 40)])";
+    let faults = Faults::parse("faults.ron", faults, &machine).unwrap_or_else(|e| panic!("{e}"));
+    let plant = Plant::new(&CalibratedMachine::nominal(machine.clone())).with_faults(&faults);
+    // Settled positions, never with both axes from below.
+    let mut table = String::from("a[deg],c[deg],y[mm],x[mm],z[mm],a_direction[1],c_direction[1]\n");
+    for k in 0..120 {
+        let s = f64::from(k);
+        let (a, c) = [(1, -1), (-1, 1), (-1, -1)][k as usize % 3];
+        let at = [
+            60.0 * s.sin(),
+            3.1 * s,
+            200.0 * (1.7 * s).sin(),
+            200.0 * (2.3 * s).cos(),
+            90.0 * (0.9 * s).sin(),
+        ];
+        let at = at.map(|x| format!("{x:.3}")).join(",");
+        table.push_str(&format!("{at},{a},{c}\n"));
+    }
+    std::fs::write(bench.0.join("poses.csv"), table).expect("writable");
+    let course =
+        CommandTable::open(bench.0.join("poses.csv"), &machine, 1.0).unwrap_or_else(|e| panic!("{e}"));
+    let run = Run {
+        course: Box::new(course),
+        instrument: Instrument::new(Sensor::Pose, 1e-7, 1e-6),
+        claims: Claims::default(),
+        directions: true,
+    };
+    let texts = recordings(&plant, &[run], &Style::si(), 1).unwrap_or_else(|e| panic!("{e}"));
+    let measured =
+        Recording::from_bytes("rec.csv", texts[0].as_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"));
+    let axes = ["a", "c"].map(|name| machine.commands().iter().position(|c| c == name).expect("an axis"));
+    let varying = Varying { directions: Some(Directions::new(axes.to_vec())), terms: Vec::new() };
+    let model = Model { varying, ..Model::default() };
+    let (calibrated, _) = calibrate_model(&machine, &[measured], &model, Options::default(), &|_| {})
+        .unwrap_or_else(|e| panic!("{e}"));
+    std::fs::write(bench.0.join("machine.ron"), calibrated.to_ron()).expect("writable");
+    let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let said = text(&out.stdout);
+    // Where the machine came from before line 2 is not known: the direction of each axis' first motion, C down in line 4 and A down in
+    // line 5, holds before it. 6: A up; 7: C up, A still as it came.
+    let parts = [
+        "at 2 blocks where a direction of travel changes",
+        "lines 6, 7",
+        "from where a, c comes at line 2 is not known; taken is the direction of its first motion",
+        "at 1 block the axes travel in a pattern of directions that the calibration has not seen (AFCF)",
+        "have shown: line 7",
+    ];
+    for part in parts {
+        assert!(said.contains(part), "{part}\n{said}");
+    }
+    let json: serde_json::Value =
+        serde_json::from_str(&bench.read("out.json").expect("written")).expect("JSON");
+    // A turns round in line 6, with a play of 60 urad.
+    let step = json["reversals"]["first"][0]["step_rad"].as_f64().expect("a number");
+    assert!((step - 60e-6).abs() < 6e-6, "{json}");
+    assert_eq!(json["unseen_directions"]["first"][0], serde_json::json!({"line": 7, "piece": "AFCF"}));
+}

@@ -1,0 +1,13 @@
+//! The command line: what the program prints and writes, and whether the documents say the same.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod cli;
+mod compensate;
+mod diagnose;
+mod docs_effects;
+mod docs_equations;
+mod docs_recordings;
+mod outputs;
+mod simulate;

@@ -1,0 +1,21 @@
+//! Laws that hold for every machine, pose, recording and program: algebra against automatic differentiation, files there and back,
+//! messages for what is at fault.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bad_effects;
+mod bad_machines;
+mod calibrated;
+mod compensate;
+mod effects;
+mod effects_in_files;
+mod features;
+mod inverse;
+mod jacobians;
+mod join;
+mod lie;
+mod machines;
+mod nc;
+mod recordings;
+mod simulate;
