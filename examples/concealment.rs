@@ -88,7 +88,7 @@ fn geometric(set: &Set, recordings: &[Recording]) -> f64 {
     let options = Options { loss: Loss::Squares, prior: false, ..Options::default() };
     let (_, fit) =
         calibrate(&set.machine, recordings, options).unwrap_or_else(|e| panic!("{}: {e}", set.name));
-    fit.rms_m.expect("lengths").geometric
+    fit.rms.m.expect("lengths").geometric
 }
 
 /// What a set says of itself.
@@ -106,7 +106,7 @@ impl Own {
         Own {
             findings: names(&said),
             unexplained: said.unexplained.as_ref().map(|u| u.at.clone()),
-            held_out: said.held_out_rms_m.expect("lengths").r#final,
+            held_out: said.held_out_rms.m.expect("lengths").r#final,
             geometric: geometric(set, &recordings),
         }
     }

@@ -18,7 +18,7 @@ use crate::machine::{
 };
 use crate::units::Unit;
 
-use crate::rms::Rms;
+use crate::units::Rms;
 use crate::variation::Variation;
 use pieces::{AxisForm, PiecesForm};
 

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use num_dual::{Dual64, DualSVec64};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, deviation_jacobian};
 use crate::lie::{Pose, Twist, Vec3};
@@ -18,7 +18,7 @@ use crate::sensor::{MOST_READINGS, Sensor, SensorState};
 pub const PASS: f64 = 1e-12;
 
 /// Result of one kind of Jacobian on one machine.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Check {
     /// What was measured: `pose`, `position`, `distance`, `displacement`, `joint`.
     pub measurement: String,

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SVD};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::chain::Chain;
 use crate::check::random_command;
@@ -13,12 +13,12 @@ use crate::machine::{Branch, Dyad, Joint, JointKind, Machine};
 use crate::sensor::{Sensor, SensorState};
 
 /// Everything that `describe` prints. Numbers in SI.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Description {
     /// Name of the machine.
     pub machine: String,
     /// What it is, if the file says so.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub about: Option<String>,
     /// Branches as one line each, from the base outwards, then side branches from what carries them.
     pub topology: Vec<String>,
@@ -35,7 +35,7 @@ pub struct Description {
 }
 
 /// One dyad.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DyadDescription {
     /// Frame.
     pub frame: String,
@@ -46,14 +46,14 @@ pub struct DyadDescription {
     /// Rotation vector in the frame before, rad.
     pub rotation_rad: [f64; 3],
     /// Joint in words, if there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
     /// Tolerances of translations (m) and rotations (rad).
     pub tolerance: [f64; 2],
 }
 
 /// What an instrument identifies.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Identifiable {
     /// `pose`, `position`, `distance`, `distance, length unknown`, `displacement`.
     pub measurement: String,

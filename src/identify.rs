@@ -38,7 +38,7 @@ pub use solve::{Solver, Stop};
 pub(crate) use source::{Known, Source, Sources, channel};
 pub(crate) use stretch::{Beginning, Memories, Stretch, by_dyad, stretches};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
@@ -46,8 +46,7 @@ use crate::error_motion::Motions;
 use crate::lie::{Pose, Twist};
 use crate::machine::Machine;
 use crate::recording::Recording;
-pub use crate::rms::Rms;
-use crate::units::Quantity;
+use crate::units::Rms;
 use crate::variation::{Variation, Varying};
 use evidence::Sizes;
 use information::Information as Info;
@@ -92,7 +91,7 @@ pub struct Model {
 }
 
 /// From which side a joint came that never moves in a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Approach {
     /// Index of the recording.
     pub recording: usize,
@@ -329,7 +328,7 @@ fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &
 }
 
 /// What recordings can tell, before anything is identified.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Reach {
     /// Independent combinations of all unknowns that these recordings see.
     pub rank: usize,
@@ -418,7 +417,7 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
         let next = with_stated(problem.sources, &seen);
         let changed = noise.iter().zip(&next).any(|(a, b)| {
             let differs = |x: f64, y: f64| (x - y).abs() > 3e-3 * y;
-            differs(a.length, b.length) || differs(a.angle, b.angle)
+            differs(a.m, b.m) || differs(a.rad, b.rad)
         });
         if !changed {
             break;
@@ -443,7 +442,8 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
         problem.free.iter().filter(|f| **f).count() as f64
     } + normal.used_by_motions;
     let kinds: Vec<_> = sources.iter().map(source::Source::noise_group).collect();
-    let rows = normal.tallies.iter().map(|t| t.length.inliers + t.angle.inliers).sum::<u64>() as f64;
+    let rows =
+        normal.tallies.iter().map(|t| t.residuals.m.inliers + t.residuals.rad.inliers).sum::<u64>() as f64;
     // Every scalar row bears its part of the parameters that are used up.
     let left = (1.0 - used / rows).max(0.05);
     kinds
@@ -457,7 +457,7 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
                 0 => present,
                 n => (sums.inlier_squares / (n as f64 * left)).sqrt().max(thin::FINEST),
             };
-            Noise { length: scale(&sum.length, present.length), angle: scale(&sum.angle, present.angle) }
+            sum.residuals.zip(*present).map(|(sums, present)| scale(&sums, present))
         })
         .collect()
 }
@@ -470,10 +470,11 @@ fn with_stated(sources: &Sources, seen: &[Noise]) -> Vec<Noise> {
         .zip(seen)
         .map(|(source, seen)| match source.recording.header().sigma {
             None => *seen,
-            Some(sigma) if sigma.quantity == Quantity::Angle => {
-                Noise { angle: sigma.value.max(seen.angle), ..*seen }
+            Some(sigma) => {
+                let mut noise = *seen;
+                noise[sigma.quantity] = sigma.value.max(seen[sigma.quantity]);
+                noise
             }
-            Some(sigma) => Noise { length: sigma.value.max(seen.length), ..*seen },
         })
         .collect()
 }

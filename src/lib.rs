@@ -14,29 +14,40 @@
 //!
 //! Nothing in the code knows a particular machine: machines are RON files ([`machine`], `docs/machines.md`).
 //!
-//! # Map of modules, imports run from the last to the first
+//! # Rooms
 //!
-//! | module | noun |
+//! One noun a room. Imports run one way: a room uses only rooms above it in this table, and a test holds it to that.
+//!
+//! | room | noun |
 //! | --- | --- |
-//! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians; generic over [`Scalar`] |
-//! | [`units`], [`error`] | the borders: units, places, messages with their mend |
-//! | [`machine`] | dyads, joints, RON |
+//! | `scalar` | [`Scalar`]: what kinematics is generic over, `f64` and dual numbers |
+//! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians |
+//! | [`units`] | units at the borders, and what lengths and angles have one of each |
+//! | `residual` | how large residuals are: sums from which RMS, mean and largest follow |
+//! | [`error`] | places in what a user wrote, faults with their mend |
+//! | `document` | RON texts, and where in them each value stands |
+//! | [`machine`] | dyads, joints, the machine file |
 //! | [`chain`] | poses and Jacobian rows of a machine with given deviations |
 //! | [`sensor`] | what instruments read, and how that depends on every unknown |
 //! | [`check`] | every Jacobian against forward-mode autodiff |
 //! | [`recording`] | CSV recordings, streamed |
-//! | [`motion`], [`feature`] | the history of a path; what a deviation depends on
-//! | [`effects`] | the physics that a kinematic model leaves out, as data
-//! | [`nc`] | NC programs: blocks, words, modal state; written back byte for byte |
-//! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
+//! | [`motion`] | directions of travel, velocities, the history of a path |
+//! | [`feature`] | what a deviation depends on, as a number for each sample |
+//! | [`error_motion`] | smooth deviations along the travel of a joint |
+//! | [`variation`] | deviations that are not constant: pieces by direction, terms |
+//! | [`effects`] | the physics that a kinematic model leaves out, as data |
+//! | `calibration` | [`CalibratedMachine`]: a machine file with its deviations |
 //! | [`location`] | the same geometry as ISO 230-1 location errors |
-//! | [`CalibratedMachine`] | a machine file with its deviations |
+//! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
+//! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
 //! | [`rivals`] | identification by other schemes, and a filter, judged side by side |
-//! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
+//! | [`diagnose`](mod@diagnose) | where model and recordings differ, and what physics was left out |
 //! | [`inverse`] | commands that bring the tool to a pose, for any chain |
-//! | [`mod@compensate`] | NC programs rewritten so that the actual machine cuts what they mean |
-//! | [`simulate`], [`demo`](mod@demo) | recordings of machines whose errors are known: faults, tests, instruments |
+//! | [`nc`] | NC programs: blocks, words, modal state; written back byte for byte |
+//! | [`compensate`](mod@compensate) | NC programs rewritten so that the actual machine cuts what they mean |
+//! | [`simulate`] | recordings of machines whose errors are known: faults, tests, instruments |
+//! | [`demo`](mod@demo) | the reference machine, a simulated recording, and what a diagnosis says of it |
 //!
 //! # A complete example
 //!
@@ -62,7 +73,7 @@
 //!            400,399.999,0.000,79.960\n";
 //! let recordings = [Recording::from_bytes("slide.csv", csv.as_bytes(), &machine)?];
 //! let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
-//! let rms = fit.rms_m.expect("lengths were measured");
+//! let rms = fit.rms.m.expect("lengths were measured");
 //! assert!(rms.geometric < 0.1 * rms.nominal);
 //! // The carriage moves along a line that is pitched by 0.1 mrad against the workpiece.
 //! let about_y = |frame: &str| calibrated.deviations()[machine.frame_index(frame).expect("a frame")].w.0[1];
@@ -81,7 +92,6 @@ pub mod describe;
 pub mod diagnose;
 mod document;
 pub mod effects;
-mod elementary;
 pub mod error;
 pub mod error_motion;
 pub mod feature;
@@ -94,8 +104,8 @@ pub mod motion;
 pub mod nc;
 pub mod predict;
 pub mod recording;
+mod residual;
 pub mod rivals;
-mod rms;
 mod scalar;
 pub mod sensor;
 pub mod simulate;

@@ -22,12 +22,13 @@
 //! ```
 
 use num_dual::Dual64;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, Sweep};
 use crate::lie::{Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::scalar::Scalar;
+use crate::units::unbounded;
 
 /// At least this share of a location error must come from the data for it to be called identified: its standard error is then below a
 /// third (√0.1) of what the tolerances alone allow.
@@ -77,7 +78,7 @@ pub trait Knowledge {
 }
 
 /// One location error.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LocationError {
     /// Name, such as `EC0Y` or `EX0C`; `docs/location.md` has the extended ones.
     pub name: String,
@@ -88,8 +89,9 @@ pub struct LocationError {
     /// Value, m or rad.
     pub value: f64,
     /// `m` or `rad`.
-    pub unit: &'static str,
+    pub unit: String,
     /// Standard error, tolerances and data together, m or rad; infinite (`null` in JSON) where nothing determines it.
+    #[serde(deserialize_with = "unbounded")]
     pub std_error: f64,
     /// What share of it comes from the data, 0 to 1: `1 - posterior variance / prior variance`.
     pub share: f64,
@@ -98,20 +100,20 @@ pub struct LocationError {
 }
 
 /// All location errors of a machine with the datum that they refer to.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LocationErrors {
     /// Joint along which X (or whichever comes first) of the machine coordinate system lies.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub primary: Option<String>,
     /// Joint that fixes the turn about the primary axis.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub secondary: Option<String>,
     /// Point in frame `t` to which offsets of rotary axes refer, with all commands zero, m.
     pub reference_t_m: [f64; 3],
     /// The errors: linear axes, then rotary ones.
     pub errors: Vec<LocationError>,
     /// Why there are none, where ISO 230-1 location errors do not apply.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
 
@@ -155,7 +157,7 @@ pub fn location_errors(
                 axis: geometry.axes[item.axis].joint.clone(),
                 direction: item.direction.0,
                 value,
-                unit: if item.offset { "m" } else { "rad" },
+                unit: if item.offset { "m" } else { "rad" }.into(),
                 std_error: known.posterior_variance.sqrt(),
                 share,
                 identified: share >= IDENTIFIED && known.unseen <= UNSEEN,

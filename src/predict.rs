@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::calibration::{CalibratedMachine, LeftOut};
 use crate::chain::Chain;
@@ -12,78 +12,42 @@ use crate::identify::{Beginning, Evaluator, Memories, Moment, Stretch, Values, c
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::recording::{Header, NominalLength, Recording, Role, ToolPoint};
+use crate::residual::Sizes;
 use crate::sensor::{Sensor, SensorState};
-use crate::units::Unit;
+use crate::units::{ByQuantity, Rms, Unit, field_by_quantity};
+
+field_by_quantity!(rms, max, mean, mean_abs);
 
 /// Residuals of a recording under a model, SI. Angles stand beside or instead of lengths.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Prediction {
     /// Samples predicted.
     pub samples: u64,
     /// Rows left out because a number was missing.
     pub dropped: u64,
-    /// Root mean square of the residual's norm, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_m: Option<f64>,
-    /// Largest norm, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_m: Option<f64>,
-    /// Mean, m: signed for scalars, of the norm for vectors.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_m: Option<f64>,
-    /// Mean of the residual's norm, m; of a `distance` the mean radial error.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_abs_m: Option<f64>,
-    /// Root mean square of the rotation residual, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_rad: Option<f64>,
-    /// Largest rotation residual, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_rad: Option<f64>,
-    /// Mean rotation residual, rad; signed for scalars.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_rad: Option<f64>,
-    /// Mean of the rotation residual's norm, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_abs_rad: Option<f64>,
+    /// Root mean square of the residual's norm; of a pose, position and rotation apart.
+    #[serde(flatten, with = "rms")]
+    pub rms: Rms,
+    /// Largest norm.
+    #[serde(flatten, with = "max")]
+    pub max: Rms,
+    /// Mean: signed for scalars, of the norm for vectors.
+    #[serde(flatten, with = "mean")]
+    pub mean: Rms,
+    /// Mean of the norm; of a `distance` the mean radial error.
+    #[serde(flatten, with = "mean_abs")]
+    pub mean_abs: Rms,
     /// Samples at which a joint leaves the range that the calibration has seen.
     pub extrapolated_samples: u64,
     /// Samples with a pattern of directions of travel that the calibration has not seen; they are predicted from what single
     /// directions have shown.
     pub unseen_directions: u64,
     /// Effects of the calibrated file that this recording cannot use.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
     /// The names of those patterns, such as `AFCR`; `0` is an axis that never moves.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unseen_pieces: Vec<String>,
-}
-
-/// Sums over residual norms of one kind.
-#[derive(Default)]
-struct Sums {
-    count: u64,
-    squares: f64,
-    largest: f64,
-    total: f64,
-    total_norm: f64,
-}
-
-impl Sums {
-    fn add(&mut self, residual: &[f64]) {
-        let norm = residual.iter().map(|r| r * r).sum::<f64>().sqrt();
-        self.count += 1;
-        self.squares += norm * norm;
-        self.largest = self.largest.max(norm);
-        self.total += if let [scalar] = residual { *scalar } else { norm };
-        self.total_norm += norm;
-    }
-
-    fn figures(&self) -> [Option<f64>; 4] {
-        let n = self.count as f64;
-        let some = |x: f64| (self.count > 0).then_some(x);
-        [some((self.squares / n).sqrt()), some(self.largest), some(self.total / n), some(self.total_norm / n)]
-    }
 }
 
 /// Model and residual of every sample of a recording; each row goes to `out` as CSV if one is given.
@@ -140,7 +104,7 @@ pub fn predict(
         write_head(*out, recording, &columns).map_err(failed)?;
     }
     let mut work = evaluator.workspace();
-    let (mut lengths, mut angles) = (Sums::default(), Sums::default());
+    let mut sizes = ByQuantity::<Sizes>::default();
     let (mut dropped, mut extrapolated) = (0, 0);
     let mut unseen = vec![0u64; evaluator.piece_count()];
     let (commands, values) = (machine.commands().len(), recording.value_count());
@@ -159,11 +123,11 @@ pub fn predict(
                 let residuals = &residuals[..sensor.reading_count()];
                 match &sensor {
                     Sensor::Pose => {
-                        lengths.add(&residuals[..3]);
-                        angles.add(&residuals[3..]);
+                        sizes.m.take(&residuals[..3]);
+                        sizes.rad.take(&residuals[3..]);
                     }
-                    Sensor::Joint { dyad } if is_revolute(machine, *dyad) => angles.add(residuals),
-                    _ => lengths.add(residuals),
+                    Sensor::Joint { dyad } if is_revolute(machine, *dyad) => sizes.rad.take(residuals),
+                    _ => sizes.m.take(residuals),
                 }
                 if out.is_some() {
                     let sign = quaternion_sign(recording, row.text, measured, &sensor);
@@ -176,20 +140,13 @@ pub fn predict(
         }
         dropped += block.chunk.dropped;
     }
-    let [rms_m, max_m, mean_m, mean_abs_m] = lengths.figures();
-    let [rms_rad, max_rad, mean_rad, mean_abs_rad] = angles.figures();
-    let samples = lengths.count.max(angles.count);
     Ok(Prediction {
-        samples,
+        samples: sizes.samples(),
         dropped,
-        rms_m,
-        max_m,
-        mean_m,
-        mean_abs_m,
-        rms_rad,
-        max_rad,
-        mean_rad,
-        mean_abs_rad,
+        rms: sizes.rms(),
+        max: sizes.largest(),
+        mean: sizes.mean_signed(),
+        mean_abs: sizes.mean(),
         extrapolated_samples: extrapolated,
         unseen_directions: unseen.iter().sum(),
         left_out,

@@ -21,7 +21,7 @@
 //!     Arena { machine: &machine, fit_on: &recordings, judge_on: &[], truth: None, fit_setup: false };
 //! let scheme = |step| Rival::Scheme(Scheme { form: Form::Tangent, step, steps: 20 });
 //! let truncated = arena.judge("tangent", &scheme(Step::Truncated { cut: 1e-6, unit_m: 1.0 }))?;
-//! assert!(truncated.judged.and_then(|r| r.mean_m).expect("it was fitted") < 2e-6);
+//! assert!(truncated.judged.and_then(|r| r.mean.m).expect("it was fitted") < 2e-6);
 //! // A position sees 5 of the 18 numbers of this model: plain normal equations cannot be solved.
 //! assert!(arena.judge("tangent, plain", &scheme(Step::GaussNewton))?.failed.is_some());
 //! # Ok::<(), kincal::Error>(())
@@ -38,7 +38,7 @@ mod step;
 pub use compare::{Arena, Verdict, split};
 pub use form::Form;
 pub use judge::{AgainstTruth, Residuals, against_truth, residuals};
-pub use kalman::{Kalman, KalmanOptions, Noise, Stream, Update};
+pub use kalman::{Kalman, KalmanOptions, Stream, Update};
 pub use scheme::Scheme;
 pub use step::Step;
 

@@ -8,7 +8,9 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use num_dual::{Dual64, DualNum, DualSVec64};
 
-use crate::elementary::{exponentials, sines_cosines};
+mod elementary;
+
+pub(crate) use elementary::{exponentials, sines_cosines};
 
 /// A number that the kinematic kernels can work with: `f64`, [`Dual64`], [`DualSVec64`].
 ///

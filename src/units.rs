@@ -1,5 +1,12 @@
 //! Units of the borders. Inside, everything is m, rad, s; here is the one place that converts.
 
+pub(crate) mod by_quantity;
+mod unbounded;
+
+pub(crate) use by_quantity::field_by_quantity;
+pub use by_quantity::{ByQuantity, Rms};
+pub(crate) use unbounded::unbounded;
+
 use std::fmt;
 
 /// What a unit measures.

@@ -4,8 +4,9 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use kincal::identify::{Figures, Fit, Loss, Model, Options, Rms, Solver, calibrate_model};
+use kincal::identify::{Figures, Fit, Loss, Model, Options, Solver, calibrate_model};
 use kincal::machine::JointKind;
+use kincal::units::Rms;
 use kincal::units::{Quantity, Unit, amount};
 use kincal::variation::{Directions, MOST_AXES, Varying};
 use kincal::{CalibratedMachine, Machine};
@@ -292,7 +293,7 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         let (samples, before, after) = (r.samples.to_string(), rms(&r.nominal), rms(&r.geometric));
         rows.push(words([&r.name, &r.setup, &r.measurement, &samples, &before, &after]));
     }
-    for (pair, kind) in [(fit.rms_m, Kind::Length), (fit.rms_rad, Kind::Angle)] {
+    for (pair, kind) in [(fit.rms.m, Kind::Length), (fit.rms.rad, Kind::Angle)] {
         if let Some(pair) = pair.filter(|_| fit.recordings.len() > 1) {
             let [before, after] = [pair.nominal, pair.geometric].map(|x| kind.show(x));
             rows.push(words(["all", "", "", "", &before, &after]));

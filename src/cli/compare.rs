@@ -169,9 +169,9 @@ fn render(machine: &str, samples: u64, judged_by: &str, has_truth: bool, verdict
             m.map(length).into_iter().chain(rad.map(angle)).collect::<Vec<_>>().join(", ")
         };
         let steps = verdict.steps.map_or_else(|| "failed".to_string(), |n| n.to_string());
-        let fitted = verdict.fitted.map_or_else(String::new, |r| both(r.mean_m, r.mean_rad));
-        let judged = verdict.judged.map_or_else(String::new, |r| both(r.mean_m, r.mean_rad));
-        let largest = verdict.judged.map_or_else(String::new, |r| both(r.max_m, r.max_rad));
+        let fitted = verdict.fitted.map_or_else(String::new, |r| both(r.mean.m, r.mean.rad));
+        let judged = verdict.judged.map_or_else(String::new, |r| both(r.mean.m, r.mean.rad));
+        let largest = verdict.judged.map_or_else(String::new, |r| both(r.max.m, r.max.rad));
         let mut row = vec![verdict.rival.clone(), steps, fitted, judged, largest];
         if let Some(t) = verdict.truth {
             row.extend([length(t.dp_m), angle(t.dr_rad), angle(t.tilt_rad), length(t.reading_m)]);

@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         demo.fit.samples
     );
     text.push_str(&calibrate::render(&demo.fit, false));
-    if let Some(rms) = demo.fit.rms_m {
+    if let Some(rms) = demo.fit.rms.m {
         let _ = writeln!(
             text,
             "\nThe bar's deviation falls from {} to {} RMS, and not to the noise.\n\nThen, what the geometry leaves over (kincal diagnose):\n",

@@ -82,7 +82,7 @@ fn render(p: &Prediction, name: &str) -> String {
     }
     text.push('\n');
     for (figures, kind) in
-        [([p.rms_m, p.max_m, p.mean_m], Kind::Length), ([p.rms_rad, p.max_rad, p.mean_rad], Kind::Angle)]
+        [([p.rms.m, p.max.m, p.mean.m], Kind::Length), ([p.rms.rad, p.max.rad, p.mean.rad], Kind::Angle)]
     {
         if let [Some(rms), Some(max), Some(mean)] = figures.map(|x| x.map(|x| kind.show(x))) {
             text.push_str(&format!(

@@ -1,6 +1,6 @@
 //! From which side a joint came that stands still all through a recording, as the readings say it: `docs/diagnosis.md` (73).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::held_out::Model;
 use super::search::{Active, Search};
@@ -9,7 +9,7 @@ use crate::identify::Approach;
 use crate::machine::Machine;
 
 /// A joint that stands still all through a recording.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StandsStill {
     /// File name.
     pub recording: String,
@@ -26,7 +26,7 @@ pub struct StandsStill {
 }
 
 /// A column that says from which side a joint came.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SaidBy {
     /// Its heading, `<command>_direction[1]`.
     pub column: String,

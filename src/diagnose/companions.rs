@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::diagnosis::Named;
 use super::held_out::Model;
@@ -13,7 +13,7 @@ use crate::effects::Library;
 use crate::machine::Machine;
 
 /// A joint that has an effect of the findings too, so little that it is no finding; the model has it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Companion {
     /// Name of the effect.
     pub effect: String,

@@ -4,10 +4,10 @@ use super::curves::{column, product};
 use super::series::{Motion, Series, over_range, series, smooth, unit};
 use super::shape::{EARLY, UNKNOWN};
 use crate::effects::Place;
-use crate::elementary::sines_cosines;
 use crate::feature::{JointSamples, Samples};
 use crate::lie::Twist;
 use crate::machine::{Joint, JointKind};
+use crate::scalar::sines_cosines;
 use crate::variation::Slot;
 
 /// Orders of the series along a joint's travel for its own motion, and for what its guideway or bearing does.

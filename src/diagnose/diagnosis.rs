@@ -1,6 +1,6 @@
 //! What a diagnosis says, as data: `docs/diagnosis.md`.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::approaches::StandsStill;
 use super::companions::Companion;
@@ -15,9 +15,12 @@ use super::unexplained::Unexplained;
 use crate::effects::StoredEffect;
 use crate::identify::BeforeAfter;
 use crate::location::LocationErrors;
+use crate::units::{ByQuantity, field_by_quantity};
+
+field_by_quantity!(noise_floor, rms, held_out_rms, rms_without_outliers);
 
 /// Everything that a diagnosis has to say. Numbers in SI; `docs/diagnosis.md` lists the fields.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Name of the machine.
     pub machine: String,
@@ -25,61 +28,49 @@ pub struct Diagnosis {
     pub recordings: Vec<String>,
     /// Samples judged.
     pub samples: u64,
-    /// Standard deviation of the noise of lengths, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise_floor_m: Option<f64>,
-    /// The same of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise_floor_rad: Option<f64>,
-    /// RMS of lengths under three models, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_m: Option<RmsByModel>,
-    /// The same of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_rad: Option<RmsByModel>,
-    /// RMS of lengths over stretches that were left out of the fit, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_rms_m: Option<HeldOutRms>,
-    /// The same of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_rms_rad: Option<HeldOutRms>,
+    /// Standard deviation of the noise.
+    #[serde(flatten, with = "noise_floor")]
+    pub noise_floor: ByQuantity<Option<f64>>,
+    /// RMS under three models.
+    #[serde(flatten, with = "rms")]
+    pub rms: ByQuantity<Option<RmsByModel>>,
+    /// RMS over stretches that were left out of the fit.
+    #[serde(flatten, with = "held_out_rms")]
+    pub held_out_rms: ByQuantity<Option<HeldOutRms>>,
     /// Each set-up left out of the fit in turn, where there are several.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set_ups_left_out: Vec<SetUpLeftOut>,
     /// What was found, strongest evidence first.
     pub findings: Vec<Finding>,
     /// Joints that have an effect of the findings too, which comes anew with every set-up; the model has them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub companions: Vec<Companion>,
     /// Joints that stand still all through a recording, and have an effect that depends on how they came there.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stand_still: Vec<StandsStill>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
     /// Part of the structure left over by geometry that is no family's shape, 0 to 1, where something was found.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape_share: Option<f64>,
     /// What the calibrated file is made of: the effects of `findings` and `companions`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
     /// Effects that could not be looked for in these recordings.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_tried: Vec<NotTried>,
     /// What hangs on the machine beside its chain, and no recording says how it stood.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unseen_side_branches: Vec<UnseenSideBranch>,
     /// Rows left out because a number was missing.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub dropped: u64,
     /// Samples that were left out because they lie far off.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outliers: Vec<Outliers>,
-    /// RMS of lengths without them, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_without_outliers_m: Option<WithoutOutliers>,
-    /// The same of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_without_outliers_rad: Option<WithoutOutliers>,
+    /// RMS without them.
+    #[serde(flatten, with = "rms_without_outliers")]
+    pub rms_without_outliers: ByQuantity<Option<WithoutOutliers>>,
     /// What its pictures show.
     #[serde(skip)]
     pub traces: Traces,
@@ -97,7 +88,7 @@ pub(super) struct Named {
 }
 
 /// RMS under three models.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct RmsByModel {
     /// The machine as declared.
     pub nominal: f64,
@@ -108,7 +99,7 @@ pub struct RmsByModel {
 }
 
 /// Held-out RMS under two models.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HeldOutRms {
     /// With constant deviations.
     pub geometric: f64,

@@ -1,16 +1,19 @@
 //! One effect that was found, as data: `docs/diagnosis.md`.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::stretch::Where;
+use crate::units::{ByQuantity, field_by_quantity};
+
+field_by_quantity!(held_out_rms);
 
 /// One effect.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Finding {
     /// Its name.
     pub effect: String,
     /// Name of its family, where that is a form of what `effect` names.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub form: Option<String>,
     /// Joint, frame or `measurement`.
     pub at: String,
@@ -22,16 +25,13 @@ pub struct Finding {
     pub probability: f64,
     /// Half of it is the logarithm of the evidence for it.
     pub delta_bic: f64,
-    /// Lengths on stretches that were left out, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_rms_m: Option<HeldOutPair>,
-    /// The same of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_rms_rad: Option<HeldOutPair>,
+    /// RMS on stretches that were left out.
+    #[serde(flatten, with = "held_out_rms")]
+    pub held_out_rms: ByQuantity<Option<HeldOutPair>>,
     /// Where it acts.
     pub r#where: Vec<Where>,
     /// What a cause that cannot be one does as well.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placebo: Option<Meaningless>,
     /// What these recordings cannot tell from it.
     pub confusable_with: Vec<Confusable>,
@@ -47,7 +47,7 @@ impl Finding {
 }
 
 /// A number of a finding.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Size {
     /// Its name.
     pub name: String,
@@ -60,7 +60,7 @@ pub struct Size {
 }
 
 /// The same family at the same place with as many numbers, and a cause that has nothing to do with it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Meaningless {
     /// The cause, as part of a sentence: of all, the one with which most is explained.
     pub cause: String,
@@ -69,7 +69,7 @@ pub struct Meaningless {
 }
 
 /// Another name for the same.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Confusable {
     /// Name of the family.
     pub effect: String,
@@ -82,7 +82,7 @@ pub struct Confusable {
 }
 
 /// Held-out RMS without and with one finding.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HeldOutPair {
     /// All others taken in.
     pub before: f64,

@@ -6,6 +6,7 @@ use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
 use super::finding::HeldOutPair;
 use super::search::{Active, Search, all_but};
 use super::space::gram;
+use crate::units::{ByQuantity, Quantity};
 
 /// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
 const FOLDS: usize = 5;
@@ -20,7 +21,7 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
         let rms = |left: &[f64]| rms_of(search, left, angle);
         Some(HeldOutRms { geometric: rms(&geometric)?, r#final: rms(&last)? })
     };
-    (diagnosis.held_out_rms_m, diagnosis.held_out_rms_rad) = (both(false), both(true));
+    diagnosis.held_out_rms = ByQuantity::of(|quantity| both(quantity == Quantity::Angle));
     let is_of = |a: usize, b: usize| a == b || search.is_one(told[a].candidate, told[b].candidate);
     for (i, finding) in diagnosis.findings.iter_mut().enumerate() {
         let before = with(&|effect| !is_of(effect, i));
@@ -28,7 +29,7 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
             let rms = |left: &[f64]| rms_of(search, left, angle);
             Some(HeldOutPair { before: rms(&before)?, after: rms(&last)? })
         };
-        (finding.held_out_rms_m, finding.held_out_rms_rad) = (pair(false), pair(true));
+        finding.held_out_rms = ByQuantity::of(|quantity| pair(quantity == Quantity::Angle));
     }
 }
 

@@ -115,8 +115,8 @@ pub(super) fn but_late(candidates: &[Candidate], joint: usize) -> Vec<Candidate>
 /// Whether another story foretells stretches that are left out better, and leaves nothing unexplained that the first one explains.
 pub(super) fn foretells_better(other: &Diagnosis, first: &Diagnosis) -> bool {
     let ratio = |other: Option<HeldOutRms>, first: Option<HeldOutRms>| Some(other?.r#final / first?.r#final);
-    let lengths = ratio(other.held_out_rms_m, first.held_out_rms_m);
-    let angles = ratio(other.held_out_rms_rad, first.held_out_rms_rad);
+    let lengths = ratio(other.held_out_rms.m, first.held_out_rms.m);
+    let angles = ratio(other.held_out_rms.rad, first.held_out_rms.rad);
     let ratios: Vec<f64> = lengths.into_iter().chain(angles).collect();
     (other.unexplained.is_none() || first.unexplained.is_some())
         && ratios.iter().all(|ratio| *ratio <= 1.0)

@@ -58,8 +58,8 @@ impl Diagnosis {
         };
         self.location_errors = fit.location_errors;
         let rms = calibrated.rms();
-        last(&mut self.rms_m, fit.rms_m.and(rms.m));
-        last(&mut self.rms_rad, fit.rms_rad.and(rms.rad));
+        last(&mut self.rms.m, fit.rms.m.and(rms.m));
+        last(&mut self.rms.rad, fit.rms.rad.and(rms.rad));
         let mut values = calibrated.variation().coefficients.clone().into_iter();
         let effects: Vec<StoredEffect> = (named.into_iter())
             .map(|Named { mut effect, .. }| {

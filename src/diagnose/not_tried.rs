@@ -1,11 +1,11 @@
 //! Effects that could not be looked for: what they need is not in the recordings.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::effects::{Candidates, NO_TIME};
 
 /// Effects that were tried nowhere, for one reason.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NotTried {
     /// Why, as the end of a sentence.
     pub because: String,

@@ -2,28 +2,28 @@
 //!
 //! They are left out of everything that is judged, and told.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::diagnosis::{Diagnosis, rms_of};
 use super::search::Search;
+use crate::units::{ByQuantity, Quantity, field_by_quantity};
+
+field_by_quantity!(largest);
 
 /// Samples of one recording that lie far off their surroundings whatever is taken away.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outliers {
     /// File name.
     pub recording: String,
     /// Their lines in the file.
     pub lines: Vec<u64>,
-    /// The largest departure of a length, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub largest_m: Option<f64>,
-    /// The largest departure of an angle, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub largest_rad: Option<f64>,
+    /// The largest departure.
+    #[serde(flatten, with = "largest")]
+    pub largest: ByQuantity<Option<f64>>,
 }
 
 /// RMS of all samples but outliers.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct WithoutOutliers {
     /// With constant deviations.
     pub geometric: f64,
@@ -44,11 +44,11 @@ pub(super) fn fill(search: &Search, geometric: &[f64], left: &[f64], diagnosis: 
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     };
     let waiting = super::noise::waiting(linear);
-    let (length, angle) = (others(false), others(true));
-    let (noise_m, noise_rad) = (diagnosis.noise_floor_m, diagnosis.noise_floor_rad);
-    let scatter = |row: usize| match linear.angle[row] {
-        true => noise_rad.map(|sigma| sigma.max(angle)),
-        false => noise_m.map(|sigma| sigma.max(length)),
+    let others = ByQuantity::of(|quantity| others(quantity == Quantity::Angle));
+    let floor = diagnosis.noise_floor;
+    let scatter = |row: usize| {
+        let quantity = if linear.angle[row] { Quantity::Angle } else { Quantity::Length };
+        floor[quantity].map(|sigma| sigma.max(others[quantity]))
     };
     let is_far = |row: &usize| {
         search.rows.whitener.out[*row]
@@ -71,8 +71,7 @@ pub(super) fn fill(search: &Search, geometric: &[f64], left: &[f64], diagnosis: 
         all.push(Outliers {
             recording: span.label.clone(),
             lines: samples.iter().map(|sample| linear.lines[*sample]).collect(),
-            largest_m: largest(false),
-            largest_rad: largest(true),
+            largest: ByQuantity::of(|quantity| largest(quantity == Quantity::Angle)),
         });
         without.extend(samples);
     }
@@ -90,6 +89,6 @@ pub(super) fn fill(search: &Search, geometric: &[f64], left: &[f64], diagnosis: 
     let both = |angle: bool| {
         Some(WithoutOutliers { geometric: kept(geometric, angle)?, r#final: kept(left, angle)? })
     };
-    (diagnosis.rms_without_outliers_m, diagnosis.rms_without_outliers_rad) = (both(false), both(true));
+    diagnosis.rms_without_outliers = ByQuantity::of(|quantity| both(quantity == Quantity::Angle));
     diagnosis.outliers = all;
 }

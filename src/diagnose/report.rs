@@ -27,6 +27,7 @@ use super::whereabouts::{standing, whereabouts};
 use crate::effects::{Library, Place, in_words};
 use crate::feature::Dimension;
 use crate::machine::Machine;
+use crate::units::{ByQuantity, Quantity};
 
 /// What is left may be this part of what geometry leaves over before nothing counts as explained.
 const TOLERATED: f64 = 0.2;
@@ -130,12 +131,12 @@ pub(super) fn report(
         machine: machine.name().into(),
         recordings: linear.spans.iter().map(|s| s.label.clone()).collect(),
         samples: linear.lines.len() as u64,
-        noise_floor_m: noise_of(search, noise, false),
-        noise_floor_rad: noise_of(search, noise, true),
-        rms_m: by_model(linear.fit.rms_m, rms_of(search, &left_over, false)),
-        rms_rad: by_model(linear.fit.rms_rad, rms_of(search, &left_over, true)),
-        held_out_rms_m: None,
-        held_out_rms_rad: None,
+        noise_floor: ByQuantity::of(|quantity| noise_of(search, noise, quantity == Quantity::Angle)),
+        rms: ByQuantity::of(|quantity| {
+            let left = rms_of(search, &left_over, quantity == Quantity::Angle);
+            by_model(linear.fit.rms[quantity], left)
+        }),
+        held_out_rms: ByQuantity::default(),
         set_ups_left_out,
         shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
         findings,
@@ -154,8 +155,7 @@ pub(super) fn report(
         unseen_side_branches: Vec::new(),
         dropped: linear.fit.dropped,
         outliers: Vec::new(),
-        rms_without_outliers_m: None,
-        rms_without_outliers_rad: None,
+        rms_without_outliers: ByQuantity::default(),
         traces: Traces::default(),
         location_errors: linear.fit.location_errors.clone(),
     };
@@ -298,8 +298,7 @@ fn finding(
             .collect(),
         probability,
         delta_bic: 2.0 * own.weight,
-        held_out_rms_m: None,
-        held_out_rms_rad: None,
+        held_out_rms: ByQuantity::default(),
         r#where: wheres(search, &|row| effect.columns.row(row).norm_squared()),
         placebo: None,
         confusable_with,

@@ -8,8 +8,8 @@ use nalgebra::DMatrix;
 use super::coarse::Level;
 use super::score::{Column, Rows};
 use crate::effects::Place;
-use crate::elementary::sines_cosines;
 use crate::lie::Twist;
+use crate::scalar::sines_cosines;
 use crate::variation::Slot;
 
 /// Orders of what is smooth, along a joint's travel or over time.

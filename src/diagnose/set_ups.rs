@@ -1,37 +1,37 @@
 //! Set-ups that took no part in the fit: whether what was found holds where the machine stands otherwise, `docs/diagnosis.md` (71).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::diagnosis::rms_of_rows;
 use super::placebo::Placebo;
 use super::search::{Active, Search};
 use super::space::gram;
+use crate::units::{ByQuantity, Quantity, field_by_quantity};
+
+field_by_quantity!(rms);
 
 /// What is left of one set-up when all others say what the machine is like.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SetUpLeftOut {
     /// Its name.
     pub setup: String,
     /// How many samples it has.
     pub samples: u64,
-    /// RMS of lengths, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_m: Option<LeftOutRms>,
-    /// RMS of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_rad: Option<LeftOutRms>,
+    /// RMS of its samples.
+    #[serde(flatten, with = "rms")]
+    pub rms: ByQuantity<Option<LeftOutRms>>,
 }
 
 /// RMS of a set-up left out under three models.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct LeftOutRms {
     /// With constant deviations.
     pub geometric: f64,
     /// With what was found besides.
     pub r#final: f64,
     /// With as many numbers that multiply meaningless causes, where there is such a thing for an effect.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placebo: Option<f64>,
 }
 
@@ -61,8 +61,7 @@ pub(super) fn left_out(search: &Search, told: &[Active], placebos: &[Option<Plac
         SetUpLeftOut {
             setup: name.clone(),
             samples: samples_of(search, name) as u64,
-            rms_m: rms(false),
-            rms_rad: rms(true),
+            rms: ByQuantity::of(|quantity| rms(quantity == Quantity::Angle)),
         }
     };
     names.iter().map(one).collect()

@@ -1,18 +1,18 @@
 //! What hangs on the machine beside the chain that was measured, where nothing says how it stood.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::machine::{Machine, SideBranch};
 
 /// A side branch whose joints have no column in some recording: its weight is not told from that of what carries it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnseenSideBranch {
     /// Frame that carries it.
     pub on: String,
     /// Columns that would say how it stands.
     pub columns: Vec<String>,
     /// Name of the machine as which it is recorded, where the machine file says so: a call may name those recordings too.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recorded_as: Option<String>,
 }
 

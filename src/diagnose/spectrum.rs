@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
-use crate::elementary::sines_cosines;
+use crate::scalar::sines_cosines;
 
 /// Absolute values squared of `Σ_i w_i exp(i κ x_i)` at each of these `κ`, of two columns of weights; `None` where there is no extent.
 ///

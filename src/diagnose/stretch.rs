@@ -1,19 +1,19 @@
 //! When in the recordings something is there.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::search::Search;
 
 /// A stretch of a recording.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Where {
     /// File name.
     pub recording: String,
     /// Start, s; absent without time.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from_s: Option<f64>,
     /// End, s.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_s: Option<f64>,
     /// Part of what geometry leaves over.
     pub share_of_misfit: f64,

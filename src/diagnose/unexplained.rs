@@ -1,20 +1,20 @@
 //! What no family explains: how large it is, where it fits best, and where it gathers.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::search::Search;
 use super::stretch::{Where, wheres};
 use crate::machine::{JointKind, Machine};
 
 /// Structure that no family explains.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Unexplained {
     /// How large it is, m (rad where only angles are measured).
     pub rms_m: f64,
     /// The place that it fits best.
     pub at: String,
     /// Another joint whose position it goes with, where one does.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goes_with: Option<String>,
     /// Recordings and times of it.
     pub r#where: Vec<Where>,
@@ -25,7 +25,7 @@ pub struct Unexplained {
 }
 
 /// A stretch of a joint's travel that holds more of the misfit than of the samples.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gathering {
     /// Name of the joint.
     pub joint: String,
@@ -36,7 +36,7 @@ pub struct Gathering {
     /// `m` or `rad`.
     pub unit: String,
     /// Direction of travel, -1 or 1, where it is mostly one of them.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<i8>,
     /// Part of the misfit, 0 to 1.
     pub share_of_misfit: f64,

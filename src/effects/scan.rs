@@ -4,8 +4,8 @@
 //! from the one before it by a turn of every sample, `exp(i (φ + δ)) = exp(i φ) exp(i δ)`: four multiplications instead of a sine.
 
 use super::candidate::Candidate;
-use crate::elementary::sines_cosines;
 use crate::feature::{Feature, Samples};
+use crate::scalar::sines_cosines;
 
 /// Points that are turned on from one another before sines are taken anew: rounding adds up to 1e-14 or so.
 const BLOCK: usize = 64;

@@ -1,11 +1,11 @@
 //! The result of an identification as data.
 
 use nalgebra::DVector;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::evaluator::{Evaluator, Moment};
-use super::judge::{Figures, PieceFit, Sizes, judge};
+use super::judge::{Figures, PieceFit, judge};
 use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
 use super::solve::Problem;
 use super::source::{Known, Which};
@@ -16,16 +16,18 @@ use super::{Found, Information, Loss, Options, Solver, Stop};
 use crate::error::Result;
 use crate::lie::Vec3;
 use crate::location::{LocationErrors, location_errors};
-use crate::rms::Rms;
-use crate::units::Quantity;
+use crate::residual::Sizes;
+use crate::units::{ByQuantity, Rms, field_by_quantity, unbounded};
 
 /// Names of a twist's components in the order (v; w).
 pub const COMPONENTS: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 /// Down-weighted samples that are listed one by one; all are counted.
 const LISTED: usize = 50;
 
+field_by_quantity!(rms);
+
 /// Everything that an identification has to say. Numbers in SI.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Fit {
     /// Name of the machine.
     pub machine: String,
@@ -35,12 +37,9 @@ pub struct Fit {
     pub dropped: u64,
     /// Scalar readings used.
     pub readings: u64,
-    /// RMS of lengths over samples: with the machine as declared (only what nobody has stated is fitted), and with the identified deviations, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_m: Option<BeforeAfter>,
-    /// The same for angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_rad: Option<BeforeAfter>,
+    /// RMS over samples: with the machine as declared (only what nobody has stated is fitted), and with the identified deviations.
+    #[serde(flatten, with = "rms")]
+    pub rms: ByQuantity<Option<BeforeAfter>>,
     /// One entry a recording.
     pub recordings: Vec<RecordingFit>,
     /// The scheme.
@@ -78,13 +77,13 @@ pub struct Fit {
     /// The worst of both, one by one.
     pub suspects: Vec<Suspect>,
     /// The pieces of a model that is keyed on directions of travel; empty for others.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pieces: Vec<PieceFit>,
     /// Samples that were not used but judged, all pieces together.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOut>,
     /// Coefficients of the terms.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coefficients: Vec<CoefficientFit>,
     /// What to be careful about, in sentences.
     pub warnings: Vec<String>,
@@ -97,7 +96,7 @@ pub struct Fit {
 }
 
 /// A figure before and after identification.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BeforeAfter {
     /// Machine as declared, only what nobody has stated is fitted.
     pub nominal: f64,
@@ -106,7 +105,7 @@ pub struct BeforeAfter {
 }
 
 /// Residuals of samples that were held out.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Machine as declared, only what nobody has stated is fitted.
     pub nominal: Figures,
@@ -115,16 +114,17 @@ pub struct HeldOut {
 }
 
 /// Coefficient of a term.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct CoefficientFit {
     /// Its value, in its own SI unit.
     pub value: f64,
     /// Standard error, all other unknowns free.
+    #[serde(deserialize_with = "unbounded")]
     pub std_error: f64,
 }
 
 /// How well one recording is described.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RecordingFit {
     /// File name.
     pub name: String,
@@ -143,25 +143,26 @@ pub struct RecordingFit {
     /// Standard deviation of one reading that the fit was weighted with, m (rad for an angle).
     pub sigma: f64,
     /// Noise seen in the residuals over the stated `sigma`; well above 1 means that something is not modelled.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub birge: Option<f64>,
 }
 
 /// One component of a deviation.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterFit {
     /// Frame of the dyad.
     pub frame: String,
     /// Set-up, where the component belongs to a frame `w` of its own; empty otherwise.
     pub setup: String,
     /// Axes with whose direction of travel the component changes sign; empty for a constant one.
-    #[serde(skip_serializing_if = "String::is_empty")]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub directions: String,
     /// `vx` ... `wz`.
     pub component: String,
     /// Identified value, m or rad.
     pub value: f64,
     /// Standard error, prior and data together, m or rad.
+    #[serde(deserialize_with = "unbounded")]
     pub std_error: f64,
     /// Tolerance: standard deviation of the prior, m or rad.
     pub tolerance: f64,
@@ -170,7 +171,7 @@ pub struct ParameterFit {
 }
 
 /// A combination of deviations that the data see as one number.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Combination {
     /// What share of it comes from the data, 0 to 1.
     pub share: f64,
@@ -179,7 +180,7 @@ pub struct Combination {
 }
 
 /// A set-up as found.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SetupFit {
     /// Name; empty for the default one.
     pub name: String,
@@ -192,7 +193,7 @@ pub struct SetupFit {
 }
 
 /// A sample that counted little.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Suspect {
     /// File name.
     pub recording: String,
@@ -217,12 +218,9 @@ pub(super) fn report(
     let (machine, sources, layout) = (problem.machine, problem.sources, problem.layout);
     let tallies = &found.solution.normal.tallies;
     let (before, after) = (rms_over(nominal), rms_over(tallies));
-    let pair =
-        |before: Option<f64>, after: Option<f64>| Some(BeforeAfter { nominal: before?, geometric: after? });
     let recordings = (sources.all.iter().enumerate())
         .map(|(i, source)| {
-            let angle = source.quantity(machine, 0) == Quantity::Angle;
-            let pick = |noise: &super::Noise| if angle { noise.angle } else { noise.length };
+            let quantity = source.quantity(machine, 0);
             RecordingFit {
                 name: source.label.clone(),
                 setup: sources.setups[source.setup].clone(),
@@ -231,8 +229,8 @@ pub(super) fn report(
                 dropped: source.summary.dropped,
                 nominal: rms_over(&nominal[i..=i]),
                 geometric: rms_over(&tallies[i..=i]),
-                sigma: pick(&found.noise[i]),
-                birge: source.recording.header().sigma.map(|s| pick(&found.seen[i]) / s.value),
+                sigma: found.noise[i][quantity],
+                birge: source.recording.header().sigma.map(|s| found.seen[i][quantity] / s.value),
             }
         })
         .collect();
@@ -247,8 +245,9 @@ pub(super) fn report(
         samples: sources.samples(),
         dropped: sources.all.iter().map(|s| s.summary.dropped).sum(),
         readings,
-        rms_m: pair(before.m, after.m),
-        rms_rad: pair(before.rad, after.rad),
+        rms: before
+            .zip(after)
+            .map(|(before, after)| Some(BeforeAfter { nominal: before?, geometric: after? })),
         recordings,
         solver: options.solver,
         loss: options.loss,
@@ -349,21 +348,21 @@ fn pieces(problem: &Problem, declared: &Unknowns, found: &Found) -> Result<Piece
     }
     let fit = judge(problem, unknowns, Which::Fit)?;
     let out = if picked { Some(judge(problem, unknowns, Which::HeldOut)?) } else { None };
-    let all = |sizes: &[Sizes]| {
-        let mut sum = Sizes::default();
+    let all = |sizes: &[ByQuantity<Sizes>]| {
+        let mut sum = ByQuantity::<Sizes>::default();
         sizes.iter().for_each(|s| sum.add(s));
-        sum.figures()
+        Figures::from(&sum)
     };
     if let Some(out) = &out {
         let nominal = all(&judge(problem, declared, Which::HeldOut)?);
         told.held_out = Some(HeldOut { nominal, model: all(out) });
     }
-    told.samples = fit.iter().map(|sizes| sizes.figures().samples).collect();
+    told.samples = fit.iter().map(|sizes| sizes.samples()).collect();
     if let Some(directions) = &problem.varying.directions {
         for (piece, sizes) in fit.iter().enumerate().filter(|(piece, _)| told.samples[*piece] > 0) {
             let name = directions.name(problem.machine, piece);
-            let held_out = out.as_ref().map(|out| out[piece].figures());
-            told.pieces.push(PieceFit { name, fit: sizes.figures(), held_out });
+            let held_out = out.as_ref().map(|out| Figures::from(&out[piece]));
+            told.pieces.push(PieceFit { name, fit: Figures::from(sizes), held_out });
         }
     }
     Ok(told)

@@ -16,7 +16,7 @@ const EXACT: f64 = 1e-9;
 const ROUNDING: f64 = 1e-6;
 
 /// The information of the data in coordinates scaled by the tolerances, and what follows from it together with the prior.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Information {
     /// How many independent combinations of all unknowns the data see at all.
     pub rank: usize,

@@ -1,9 +1,9 @@
 //! Robust losses, `docs/model.md` (27).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How a standardised residual `e` (in standard deviations of the noise) counts.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "snake_case")]
 pub enum Loss {
     /// `e²/2`: least squares.

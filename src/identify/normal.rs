@@ -18,22 +18,11 @@ use crate::lie::{Twist, Vec3, Wrench};
 use crate::machine::Machine;
 use crate::motion::Tracker;
 use crate::recording::Chunk;
-use crate::rms::Rms;
 use crate::sensor::{MOST_READINGS, Sensor};
-use crate::units::Quantity;
+use crate::units::{ByQuantity, Quantity, Rms};
 
-/// Noise of a source's readings: standard deviation of lengths (m) and of angles (rad).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Noise {
-    pub length: f64,
-    pub angle: f64,
-}
-
-impl Noise {
-    pub fn of(self, quantity: Quantity) -> f64 {
-        if quantity == Quantity::Angle { self.angle } else { self.length }
-    }
-}
+/// Noise of a source's readings: standard deviations.
+pub(crate) type Noise = ByQuantity<f64>;
 
 /// Sums over residuals of one quantity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,8 +48,7 @@ impl Sums {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tally {
     pub samples: u64,
-    pub length: Sums,
-    pub angle: Sums,
+    pub residuals: ByQuantity<Sums>,
     /// Samples whose weight is below one half.
     pub down_weighted: u64,
 }
@@ -68,21 +56,20 @@ pub(crate) struct Tally {
 impl Tally {
     pub fn add(&mut self, o: &Tally) {
         self.samples += o.samples;
-        self.length.add(&o.length);
-        self.angle.add(&o.angle);
+        self.residuals.m.add(&o.residuals.m);
+        self.residuals.rad.add(&o.residuals.rad);
         self.down_weighted += o.down_weighted;
     }
 }
 
 /// Root mean square over the samples of some sources.
 pub(crate) fn rms_over(tallies: &[Tally]) -> Rms {
-    let over = |pick: fn(&Tally) -> &Sums| {
-        let own: Vec<&Tally> = tallies.iter().filter(|t| pick(t).rows > 0).collect();
+    ByQuantity::of(|quantity| {
+        let own: Vec<&Tally> = tallies.iter().filter(|t| t.residuals[quantity].rows > 0).collect();
         let samples: u64 = own.iter().map(|t| t.samples).sum();
-        let squares: f64 = own.iter().map(|t| pick(t).squares).sum();
+        let squares: f64 = own.iter().map(|t| t.residuals[quantity].squares).sum();
         (samples > 0).then(|| (squares / samples as f64).sqrt())
-    };
-    Rms { m: over(|t| &t.length), rad: over(|t| &t.angle) }
+    })
 }
 
 /// Gauss-Newton matrix, gradient and loss of all data at one state, in m and rad; no prior in it.
@@ -125,7 +112,7 @@ pub(crate) fn standardised(residuals: &[f64], sigmas: &[f64]) -> f64 {
 
 /// Standard deviations of a source's readings, in order.
 pub(crate) fn sigmas(source: &Source, machine: &Machine, noise: Noise) -> Vec<f64> {
-    (0..source.sensor.reading_count()).map(|i| noise.of(source.quantity(machine, i))).collect()
+    (0..source.sensor.reading_count()).map(|i| noise[source.quantity(machine, i)]).collect()
 }
 
 /// What one chunk adds, by piece of the model; local columns: six of each dyad, the extras, the terms, the error motions.
@@ -228,7 +215,7 @@ fn part(
     let mut plain = vec![0.0; count * own_width];
     let mut total = 0.0;
     let mut tally = Tally { samples: chunk.len as u64, ..Tally::default() };
-    let angular = source_is_angle(source, evaluator.machine);
+    let quantities: Vec<Quantity> = (0..count).map(|i| source.quantity(evaluator.machine, i)).collect();
     let mut piece = |members: &[usize]| {
         let mut rows = DMatrix::<f64>::zeros(width, members.len() * count);
         let mut whitened = DVector::<f64>::zeros(members.len() * count);
@@ -252,8 +239,7 @@ fn part(
                 let factor = weight.sqrt() / sigma;
                 whitened[slot * count + i] = residual * factor;
                 own[i * width..(i + 1) * width].iter_mut().for_each(|x| *x *= factor);
-                let angle = count == 6 && i >= 3 || count == 1 && angular;
-                let sums = if angle { &mut tally.angle } else { &mut tally.length };
+                let sums = &mut tally.residuals[quantities[i]];
                 sums.rows += 1;
                 sums.squares += raw[i] * raw[i];
                 // The noise is that of the samples that the model claims to describe.
@@ -267,10 +253,6 @@ fn part(
     };
     let pieces = members.iter().map(|members| (!members.is_empty()).then(|| piece(members))).collect();
     Part { pieces, loss: total, tally }
-}
-
-fn source_is_angle(source: &Source, machine: &Machine) -> bool {
-    source.quantity(machine, 0) == Quantity::Angle
 }
 
 /// From increments behind `exp(dh)` to the deviations' own coordinates, `docs/model.md` (12).

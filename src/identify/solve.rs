@@ -1,7 +1,7 @@
 //! The solvers: Levenberg-Marquardt by gain ratio, and the named rivals, `docs/model.md` (21).
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::information::open_directions;
 use super::loss::Loss;
@@ -15,7 +15,7 @@ use crate::machine::Machine;
 use crate::variation::Varying;
 
 /// How the identification walks to its optimum.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "snake_case")]
 pub enum Solver {
     /// Damped by gain ratio (Nielsen), in coordinates scaled by the tolerances; directions that the data do not see stay where they are.
@@ -45,7 +45,7 @@ impl Solver {
 }
 
 /// Why an identification stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
     /// The next step promises a relative decrease of the objective below rounding.

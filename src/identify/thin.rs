@@ -6,7 +6,7 @@ use super::source::Sources;
 use super::unknowns::Unknowns;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::units::Quantity;
+use crate::units::ByQuantity;
 
 /// No instrument resolves less, m or rad; without it, exact simulated data would have no noise at all.
 pub(crate) const FINEST: f64 = 1e-9;
@@ -56,7 +56,7 @@ pub(crate) fn robust_noise(
 ) -> Vec<Noise> {
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let kinds: Vec<_> = sources.all.iter().map(|s| s.noise_group()).collect();
-    let mut sizes: Vec<[Vec<f64>; 2]> = sources.all.iter().map(|_| Default::default()).collect();
+    let mut sizes: Vec<ByQuantity<Vec<f64>>> = sources.all.iter().map(|_| Default::default()).collect();
     for sample in thin {
         let (evaluator, source) = (&evaluators[sample.source], &sources.all[sample.source]);
         let mut work = evaluator.workspace();
@@ -64,17 +64,15 @@ pub(crate) fn robust_noise(
         // The first source of this kind collects for all of them.
         let group = kinds.iter().position(|k| *k == kinds[sample.source]).unwrap_or(sample.source);
         for (i, r) in residuals.iter().take(source.sensor.reading_count()).enumerate() {
-            let angle = source.quantity(machine, i) == Quantity::Angle;
-            sizes[group][usize::from(angle)].push(r.abs());
+            sizes[group][source.quantity(machine, i)].push(r.abs());
         }
     }
-    let scales: Vec<[f64; 2]> = sizes.into_iter().map(|group| group.map(median_scale)).collect();
+    let scales: Vec<Noise> = sizes.into_iter().map(|group| group.map(median_scale)).collect();
     kinds
         .iter()
         .map(|kind| {
             let group = kinds.iter().position(|k| k == kind).unwrap_or(0);
-            let [length, angle] = scales[group];
-            Noise { length, angle }
+            scales[group]
         })
         .collect()
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::RecordingFault as Fault;
 use super::column::{Cell, cells, unit};
@@ -16,7 +16,7 @@ use crate::units::Unit;
 const SAME: f64 = 1e-6;
 
 /// A recording with another one's columns beside its own.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Joined {
     /// The new recording, line for line as the first one was.
     #[serde(skip)]

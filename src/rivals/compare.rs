@@ -1,6 +1,6 @@
 //! The harness: every rival fitted on the same samples and judged on others.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::judge::{AgainstTruth, Residuals, against_truth, residuals};
 use super::{Fitted, Rival};
@@ -11,27 +11,27 @@ use crate::machine::Machine;
 use crate::recording::Recording;
 
 /// How one rival did.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Verdict {
     /// Name of the rival.
     pub rival: String,
     /// Steps taken; of a filter, samples.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub steps: Option<usize>,
     /// Why it stopped.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<Stop>,
     /// Why it failed, if it did.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
     /// Residuals on what it was fitted to.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fitted: Option<Residuals>,
     /// Residuals on what it is judged by.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub judged: Option<Residuals>,
     /// Against the true machine at the samples it is judged by.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<AgainstTruth>,
 }
 

@@ -2,7 +2,7 @@
 //! belongs to it.
 
 use nalgebra::{DVector, Vector6};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::state::State;
 use crate::chain::Sweep;
@@ -11,7 +11,7 @@ use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{Branch, Joint, JointKind, Machine};
 
 /// What a scheme takes as its unknowns. Six numbers for each frame in all of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Form {
     /// Local: each frame's own deviation, `E_j <- E_j exp(d_j)`, as `docs/model.md` (11) has it.

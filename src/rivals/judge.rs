@@ -1,41 +1,36 @@
 //! How well a model does: on recordings, and against a machine whose deviations are known.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::scheme::measured_rotation;
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
 use crate::predict::{chain, predict, sensor_state};
 use crate::recording::Recording;
+use crate::residual::Sizes;
 use crate::sensor::Sensor;
+use crate::units::{ByQuantity, Quantity, Rms, field_by_quantity};
+
+field_by_quantity!(mean, rms, max);
 
 /// Residuals of a model over recordings, SI. A sample's residual is its Euclidean norm (of a pose: position and rotation apart).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Residuals {
     /// Samples.
     pub samples: u64,
-    /// Mean of lengths, m; where distances were measured this is the paper's radial error.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_m: Option<f64>,
-    /// Root mean square of lengths, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_m: Option<f64>,
-    /// Largest length, m.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_m: Option<f64>,
-    /// Mean of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub mean_rad: Option<f64>,
-    /// Root mean square of angles, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rms_rad: Option<f64>,
-    /// Largest angle, rad.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub max_rad: Option<f64>,
+    /// Mean; where distances were measured this is the paper's radial error.
+    #[serde(flatten, with = "mean")]
+    pub mean: Rms,
+    /// Root mean square.
+    #[serde(flatten, with = "rms")]
+    pub rms: Rms,
+    /// Largest.
+    #[serde(flatten, with = "max")]
+    pub max: Rms,
 }
 
 /// Distance of a model from the true machine over the samples of recordings, SI.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AgainstTruth {
     /// `dp`: mean distance of the measured point, as modelled, from where it truly is in frame `w`, m.
     pub dp_m: f64,
@@ -47,46 +42,24 @@ pub struct AgainstTruth {
     pub reading_m: f64,
 }
 
-/// Sums over recordings.
-#[derive(Default)]
-struct Sums {
-    count: f64,
-    total: f64,
-    squares: f64,
-    largest: f64,
-}
-
-impl Sums {
-    fn add(&mut self, samples: u64, mean: Option<f64>, rms: Option<f64>, max: Option<f64>) {
-        if let (Some(mean), Some(rms), Some(max)) = (mean, rms, max) {
-            let n = samples as f64;
-            self.count += n;
-            self.total += n * mean;
-            self.squares += n * rms * rms;
-            self.largest = self.largest.max(max);
-        }
-    }
-
-    fn figures(&self) -> [Option<f64>; 3] {
-        let n = self.count;
-        [self.total / n, (self.squares / n).sqrt(), self.largest].map(|x| (n > 0.0).then_some(x))
-    }
-}
-
 /// Residuals of a model over recordings.
 ///
 /// # Errors
 /// As [`predict`].
 pub fn residuals(model: &CalibratedMachine, recordings: &[Recording]) -> Result<Residuals> {
-    let (mut lengths, mut angles, mut samples) = (Sums::default(), Sums::default(), 0);
+    let (mut sizes, mut samples) = (ByQuantity::<Sizes>::default(), 0);
     for recording in recordings {
         let p = predict(model, recording, None)?;
         samples += p.samples;
-        lengths.add(p.samples, p.mean_abs_m, p.rms_m, p.max_m);
-        angles.add(p.samples, p.mean_abs_rad, p.rms_rad, p.max_rad);
+        for quantity in [Quantity::Length, Quantity::Angle] {
+            if let (Some(rms), Some(mean), Some(max)) =
+                (p.rms[quantity], p.mean_abs[quantity], p.max[quantity])
+            {
+                sizes[quantity].add(&Sizes::of(p.samples, rms, mean, max));
+            }
+        }
     }
-    let ([mean_m, rms_m, max_m], [mean_rad, rms_rad, max_rad]) = (lengths.figures(), angles.figures());
-    Ok(Residuals { samples, mean_m, rms_m, max_m, mean_rad, rms_rad, max_rad })
+    Ok(Residuals { samples, mean: sizes.mean(), rms: sizes.rms(), max: sizes.largest() })
 }
 
 /// A model against the true machine at the commands of recordings; `None` where they have no sample that sees frames `w` and `t`.

@@ -18,23 +18,14 @@ use crate::identify::{COMPONENTS, Loss, Options, Stop, calibrate};
 use crate::lie::{Pose, Twist};
 use crate::machine::{Machine, Tolerance};
 use crate::recording::Recording;
-use crate::rms::Rms;
+use crate::units::{ByQuantity, Rms};
 use unknowns::{Block, FrameW, Opened, Role, Values};
-
-/// Standard deviations of one reading.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
-    /// Of a length, m.
-    pub m: f64,
-    /// Of an angle, rad.
-    pub rad: f64,
-}
 
 /// How a filter works.
 #[derive(Clone, Copy, Debug)]
 pub struct KalmanOptions {
     /// Noise of streams whose header states no `sigma`.
-    pub noise: Option<Noise>,
+    pub noise: Option<ByQuantity<f64>>,
     /// How a sample counts that lies far from what the filter expects; [`Loss::Squares`] takes every sample as it comes.
     pub loss: Loss,
     /// How often a sample is linearised anew at most.
@@ -357,7 +348,7 @@ pub(super) fn fit(machine: &Machine, recordings: &[Recording], options: KalmanOp
                 .geometric
                 .rad
                 .map_or(of.sigma, |rad| if of.geometric.m.is_some() { rad / 3f64.sqrt() } else { of.sigma });
-            filter.options.noise = Some(Noise { m: of.sigma, rad });
+            filter.options.noise = Some(ByQuantity { m: of.sigma, rad });
         }
         filter.follow(recording)?;
     }

@@ -1,6 +1,6 @@
 //! A scheme of the literature: a parameterisation and a step, repeated. No prior, no weights, plain m and rad.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Fitted;
 use super::form::{Form, Rows, stepped};
@@ -15,7 +15,7 @@ use crate::sensor::Sensor;
 use crate::variation::CONSTANT;
 
 /// A parameterisation with a step rule.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scheme {
     /// What the unknowns are.
     pub form: Form,

@@ -1,12 +1,12 @@
 //! One step from the triangle of a linear least-squares problem: the solvers of the literature.
 
 use nalgebra::{Cholesky, DMatrix, DVector, QR, SVD};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 
 /// How a scheme takes its step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "snake_case")]
 pub enum Step {
     /// Plain normal equations; refuses what is singular.

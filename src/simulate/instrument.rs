@@ -7,6 +7,7 @@ use super::plant::State;
 use crate::lie::{Mat3, Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::sensor::{Sensor, SensorState};
+use crate::units::{ByQuantity, Quantity};
 
 /// How readings scatter; the size is [`Instrument::noise_m`] or [`Instrument::noise_rad`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,24 +38,18 @@ pub struct Instrument {
     pub sensor: Sensor,
     /// Measured points, zero and length.
     pub state: SensorState<f64>,
-    /// Size of the noise of a length reading, m.
-    pub noise_m: f64,
-    /// Size of the noise of an angle reading, rad.
-    pub noise_rad: f64,
+    /// Size of the noise of a reading.
+    pub noise: ByQuantity<f64>,
     /// How the noise is distributed.
     pub scatter: Scatter,
-    /// Step of a length reading, m; 0 for none.
-    pub resolution_m: f64,
-    /// Step of an angle reading, rad; 0 for none.
-    pub resolution_rad: f64,
+    /// Step of a reading; 0 for none.
+    pub resolution: ByQuantity<f64>,
     /// Part of the samples that are lost, 0 to 1.
     pub drop_outs: f64,
     /// Part of the samples that are far off, 0 to 1.
     pub outliers: f64,
-    /// By how much an outlier is off: normal with this standard deviation in each reading, m.
-    pub outlier_m: f64,
-    /// The same of an angle reading, rad.
-    pub outlier_rad: f64,
+    /// By how much an outlier is off: normal with this standard deviation in each reading.
+    pub outlier: ByQuantity<f64>,
 }
 
 impl Instrument {
@@ -65,27 +60,21 @@ impl Instrument {
         Instrument {
             sensor,
             state,
-            noise_m,
-            noise_rad,
+            noise: ByQuantity { m: noise_m, rad: noise_rad },
             scatter: Scatter::Normal,
-            resolution_m: 0.0,
-            resolution_rad: 0.0,
+            resolution: ByQuantity::default(),
             drop_outs: 0.0,
             outliers: 0.0,
-            outlier_m: 0.0,
-            outlier_rad: 0.0,
+            outlier: ByQuantity::default(),
         }
     }
 
-    /// Whether reading `i` is an angle.
-    pub fn is_angle(&self, machine: &Machine, i: usize) -> bool {
-        match self.sensor {
-            Sensor::Pose => i >= 3,
-            Sensor::Joint { dyad } => {
-                machine.dyads()[dyad].joint.as_ref().is_some_and(|joint| joint.kind == JointKind::Revolute)
-            }
-            _ => false,
-        }
+    /// What reading `i` measures.
+    pub fn quantity(&self, machine: &Machine, i: usize) -> Quantity {
+        let prismatic = |dyad: usize| {
+            machine.dyads()[dyad].joint.as_ref().is_some_and(|joint| joint.kind == JointKind::Prismatic)
+        };
+        self.sensor.quantity(i, matches!(self.sensor, Sensor::Joint { dyad } if prismatic(dyad)))
     }
 
     /// What it reads on the plant at its last sample, noise included, in m and rad (a pose: position, rotation vector); `None`
@@ -94,11 +83,9 @@ impl Instrument {
         // Drawn in any case, so that the noise of the others does not depend on it.
         let dropped = self.drop_outs > 0.0 && rng.random_range(0.0..1.0) < self.drop_outs;
         let off = self.outliers > 0.0 && rng.random_range(0.0..1.0) < self.outliers;
-        let mut noise = |angle: bool| {
-            let (size, outlier) =
-                if angle { (self.noise_rad, self.outlier_rad) } else { (self.noise_m, self.outlier_m) };
-            let noise = self.scatter.draw(size, rng);
-            if off { noise + outlier * normal(rng) } else { noise }
+        let mut noise = |quantity: Quantity| {
+            let noise = self.scatter.draw(self.noise[quantity], rng);
+            if off { noise + self.outlier[quantity] * normal(rng) } else { noise }
         };
         let mut values = match self.sensor {
             Sensor::Joint { dyad } => {
@@ -107,15 +94,15 @@ impl Instrument {
                     machine.dyads()[dyad].joint.as_ref().map_or(Twist::zero(0.0), |joint| joint.twist());
                 let dh = state.deviations()[dyad] + state.behind()[dyad];
                 let read = state.displacements()[dyad] + own.v.dot(dh.v) + own.w.dot(dh.w);
-                vec![read + self.state.zero + noise(self.is_angle(machine, 0))]
+                vec![read + self.state.zero + noise(self.quantity(machine, 0))]
             }
             _ => {
                 let sweep = state.chain().sweep(q);
                 let (readings, count) = self.sensor.readings(&sweep, &self.state, Mat3::identity(0.0));
                 let mut values: Vec<f64> =
-                    readings.iter().take(count.min(3)).map(|r| r.value + noise(false)).collect();
+                    readings.iter().take(count.min(3)).map(|r| r.value + noise(Quantity::Length)).collect();
                 if let Sensor::Pose = self.sensor {
-                    let shake = Twist::new(Vec3([0.0; 3]), Vec3([0, 1, 2].map(|_| noise(true))));
+                    let shake = Twist::new(Vec3([0.0; 3]), Vec3([0, 1, 2].map(|_| noise(Quantity::Angle))));
                     values.extend((Pose::exp(shake) * sweep.w_from_t()).rotation_vector().0);
                 }
                 values
@@ -124,7 +111,7 @@ impl Instrument {
         let kind = self.sensor.name();
         for (i, value) in values.iter_mut().enumerate() {
             *value += state.added(i, kind);
-            let step = if self.is_angle(machine, i) { self.resolution_rad } else { self.resolution_m };
+            let step = self.resolution[self.quantity(machine, i)];
             if step > 0.0 {
                 *value = (*value / step).round() * step;
             }

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::lie::Vec3;
 use crate::machine::{FileUnits, JointKind, Machine};
 use crate::sensor::Sensor;
-use crate::units::Unit;
+use crate::units::{Quantity, Unit};
 
 /// Resolution that the written digits must keep, m or rad.
 const FINEST: f64 = 1e-10;
@@ -137,7 +137,7 @@ impl<'a> Recorder<'a> {
             line(format!("workpiece_point[{length}]: {}", point(state.workpiece_point_w)));
         }
         if let Some(sigma) = claims.sigma {
-            let angle = self.instrument.is_angle(machine, 0);
+            let angle = self.instrument.quantity(machine, 0) == Quantity::Angle;
             let unit = if angle { self.style.measured.angle } else { self.style.measured.length };
             line(format!("sigma[{unit}]: {}", unit.write_si(sigma)));
         }
@@ -236,7 +236,7 @@ impl<'a> Recorder<'a> {
                     number(
                         &mut line,
                         values[i],
-                        of(self.style.measured, self.instrument.is_angle(self.machine, i)),
+                        of(self.style.measured, self.instrument.quantity(self.machine, i) == Quantity::Angle),
                     );
                 }
                 None => line.push_str(self.style.drop_out),

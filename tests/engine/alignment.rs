@@ -68,7 +68,7 @@ fn unknown_frame_is_found_from_positions_poses_and_unknown_tool_points() {
         let (machine, csv, m_from_w) =
             foreign(sensor.clone(), &["workpiece_frame: unknown", point], true, 11);
         let (calibrated, fit) = run(&machine, &csv);
-        let rms = fit.rms_m.expect("lengths");
+        let rms = fit.rms.m.expect("lengths");
         assert!(rms.nominal < 1e-9 && rms.geometric < 1e-9, "{sensor:?} {point}: {rms:?}");
         let found = calibrated.chain_of_setup("").expect("the set-up").previous_from_frame(machine.w_index());
         let (far, turned) = distance(found, m_from_w);
@@ -87,7 +87,7 @@ fn unknown_frame_is_found_whatever_the_machine_file_says_of_it() {
     for start in starts {
         let machine = machine_with_w(&declared, m_from_w * pose([0.1, 2.0, -5.0], start));
         let (_, fit) = run(&machine, &csv);
-        figures.push(fit.rms_m.expect("lengths").geometric);
+        figures.push(fit.rms.m.expect("lengths").geometric);
     }
     for figure in &figures {
         assert!((figure / figures[0] - 1.0).abs() < 1e-3, "{figures:?}");
@@ -108,14 +108,14 @@ fn unknown_frame_zero_and_length_are_found_from_distances_and_displacements() {
     ] {
         let (machine, csv, _) = foreign(sensor.clone(), &header, true, 31);
         let (calibrated, fit) = run(&machine, &csv);
-        let rms = fit.rms_m.expect("lengths");
+        let rms = fit.rms.m.expect("lengths");
         assert!(rms.nominal < 1e-8, "{header:?}: {rms:?}");
         // One centre, or one direction, cannot show how `w` is turned: that is told.
         assert!(fit.warnings.iter().any(|w| w.contains("not seen")), "{:?}", fit.warnings);
         let recordings =
             [Recording::from_bytes("r.csv", csv.as_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))];
         let error = predict(&calibrated, &recordings[0], None).unwrap_or_else(|e| panic!("{e}"));
-        assert!(error.rms_m.expect("lengths") < 1e-8, "{header:?}: {error:?}");
+        assert!(error.rms.m.expect("lengths") < 1e-8, "{header:?}: {error:?}");
     }
 }
 
@@ -145,7 +145,7 @@ fn two_socket_points_leave_the_turn_about_their_line_and_that_is_told() {
     }
     assert!(made > 100, "only {made} poses reached");
     let (_, fit) = run(&machine, &csv);
-    let rms = fit.rms_m.expect("lengths");
+    let rms = fit.rms.m.expect("lengths");
     assert!(rms.geometric < 0.05 * rms.nominal, "{rms:?}");
     assert_eq!(fit.open.len(), 1, "{:?}", fit.open);
     assert_eq!(fit.open[0], "the turn of w about its x axis");
@@ -200,12 +200,12 @@ fn recordings_of_several_set_ups_share_the_machine_but_not_the_frame() {
     let (calibrated, fit) =
         calibrate(&declared, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(fit.setups.len(), 2);
-    assert!(fit.rms_m.expect("lengths").geometric < 1.8 * NOISE);
+    assert!(fit.rms.m.expect("lengths").geometric < 1.8 * NOISE);
     // A third place, which the calibration has not seen: only the set-up is found again.
     let new = [open(&record(1, 70).replace("place 1", "place 7"))];
     let error = predict(&calibrated, &new[0], None).expect_err("an unknown set-up");
     assert!(error.mend().contains("--fit-setup"), "{}", error.mend());
     let fitted = fit_setup(&calibrated, &new, Default::default()).unwrap_or_else(|e| panic!("{e}"));
     let prediction = predict(&fitted, &new[0], None).unwrap_or_else(|e| panic!("{e}"));
-    assert!(prediction.rms_m.expect("lengths") < 1.9 * NOISE, "{prediction:?}");
+    assert!(prediction.rms.m.expect("lengths") < 1.9 * NOISE, "{prediction:?}");
 }

@@ -187,7 +187,7 @@ fn an_encoder_with_an_arbitrary_zero_says_nothing_about_constant_deviations() {
 fn instruments_of_one_kind_with_different_sigma_keep_their_own_noise() {
     let fine = Case::new("xyz_mill", Sensor::Position, 200);
     let mut coarse = Case::new("xyz_mill", Sensor::Position, 200);
-    coarse.instrument.noise_m = 1e-4;
+    coarse.instrument.noise.m = 1e-4;
     let with = |case: &mut Case, sigma: &str| {
         case.header.push(format!("sigma[um]: {sigma}"));
         Recording::from_bytes("r.csv", case.text().into_bytes(), &case.machine)
@@ -222,7 +222,7 @@ fn a_ballbar_of_unknown_length_is_found_from_nothing() {
         let (calibrated, fit) =
             calibrate(&case.machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
         let (_, length) = calibrated.lengths().next().expect("a length");
-        let rms = fit.rms_m.expect("lengths");
+        let rms = fit.rms.m.expect("lengths");
         println!(
             "unknown frame {unknown_frame}: length {length}, rms {rms:?}, {} steps {}",
             fit.steps, fit.stop

@@ -36,8 +36,8 @@ fn left_by_geometry(case: &Case, folder: &Path) -> f64 {
     let options = Options { loss: Loss::Squares, prior: false, ..Options::default() };
     let (_, fit) = calibrate(&machine, &recordings, options).expect("fits");
     let (sigma_m, sigma_rad) = case.world.sigma;
-    match (fit.rms_m, case.world.reads_angle()) {
-        (_, true) => fit.rms_rad.expect("angles").geometric / sigma_rad,
+    match (fit.rms.m, case.world.reads_angle()) {
+        (_, true) => fit.rms.rad.expect("angles").geometric / sigma_rad,
         (rms, false) => rms.expect("lengths").geometric / sigma_m / (case.world.width().min(3) as f64).sqrt(),
     }
 }

@@ -123,10 +123,10 @@ fn a_simulated_recording_of_a_machine_with_effects_is_what_its_file_predicts() {
     let recording = measured(&read, &path(1500, [1.3, 2.2, 2.9]), 0.0);
     let own = predict(&truth, &recording, None).unwrap_or_else(|e| panic!("{e}"));
     // Rates differ a little: a recording is looked at from both sides, a simulation backwards only.
-    let left = own.rms_m.expect("lengths");
+    let left = own.rms.m.expect("lengths");
     assert!(left < 2e-8, "{left:e}");
     let plain = CalibratedMachine::nominal(machine.clone()).with_deviations(truth.deviations().to_vec());
-    let without = predict(&plain, &recording, None).unwrap_or_else(|e| panic!("{e}")).rms_m.expect("lengths");
+    let without = predict(&plain, &recording, None).unwrap_or_else(|e| panic!("{e}")).rms.m.expect("lengths");
     assert!(without > 1e-5, "{without:e}");
 }
 
@@ -145,8 +145,8 @@ fn effects_of_a_faults_file_are_those_of_a_calibrated_file() {
     let commands = path(300, [1.3, 2.2, 2.9]);
     let again = plant.truth(&plain);
     assert_eq!(
-        predict(&again, &measured(&truth, &commands, 0.0), None).unwrap_or_else(|e| panic!("{e}")).rms_m,
-        predict(&truth, &measured(&truth, &commands, 0.0), None).unwrap_or_else(|e| panic!("{e}")).rms_m
+        predict(&again, &measured(&truth, &commands, 0.0), None).unwrap_or_else(|e| panic!("{e}")).rms.m,
+        predict(&truth, &measured(&truth, &commands, 0.0), None).unwrap_or_else(|e| panic!("{e}")).rms.m
     );
     let error = read(&faults.replace("Before(\"x\")", "Before(\"q\")")).expect_err("no such frame");
     assert!(
@@ -224,14 +224,14 @@ fn a_mill_is_measured_diagnosed_and_its_program_corrected_to_95_percent() {
     assert_eq!(names, ["backlash", "cyclic_error"]);
     // The file says of the recording what the diagnosis says of itself.
     let again = CalibratedMachine::parse("model.ron", &model.to_ron()).unwrap_or_else(|e| panic!("{e}"));
-    let rms = predict(&again, &recordings[0], None).unwrap_or_else(|e| panic!("{e}")).rms_m.expect("lengths");
-    let told = diagnosis.rms_m.expect("lengths").r#final;
+    let rms = predict(&again, &recordings[0], None).unwrap_or_else(|e| panic!("{e}")).rms.m.expect("lengths");
+    let told = diagnosis.rms.m.expect("lengths").r#final;
     assert!((rms - told).abs() < 1e-12, "{rms:e} {told:e}");
     // Left-out stretches show the effects as well: what is left there is the noise, 0.2 um in each of three readings.
-    let held = diagnosis.held_out_rms_m.expect("lengths");
+    let held = diagnosis.held_out_rms.m.expect("lengths");
     assert!(held.geometric > 5e-6 && (2e-7..5e-7).contains(&held.r#final), "{held:?}");
     for finding in &diagnosis.findings {
-        let pair = finding.held_out_rms_m.expect("lengths");
+        let pair = finding.held_out_rms.m.expect("lengths");
         assert!(pair.before > 5.0 * pair.after && pair.after == held.r#final, "{pair:?}");
     }
     let meant = path(600, [1.9, 2.6, 3.3]);

@@ -53,7 +53,7 @@ fn error_motions_come_back_from_the_file_and_prediction_and_simulation_have_them
         assert!(a.play.iter().zip(&b.play).all(|(a, b)| (a - b).abs() < 1e-15));
     }
     let rms = |model: &CalibratedMachine| {
-        predict(model, &recording, None).unwrap_or_else(|e| panic!("{e}")).rms_m.expect("lengths")
+        predict(model, &recording, None).unwrap_or_else(|e| panic!("{e}")).rms.m.expect("lengths")
     };
     // The RMS that the file tells is without them; with them it is that of the noise, 1 um.
     let told = again.rms().m.expect("lengths");

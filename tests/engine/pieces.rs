@@ -111,7 +111,7 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
             .unwrap_or_else(|e| panic!("{name}: {e}"));
         let (_, plain) = calibrate(&machine, &recordings, exact()).unwrap_or_else(|e| panic!("{name}: {e}"));
         let (with, without) =
-            (fit.rms_m.expect("lengths").geometric, plain.rms_m.expect("lengths").geometric);
+            (fit.rms.m.expect("lengths").geometric, plain.rms.m.expect("lengths").geometric);
         assert!(with < 2e-8 && without > 5e-7, "{name}: {with:e} against {without:e}");
         // The file says the same.
         let again =
@@ -120,7 +120,7 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
         assert_eq!(again.variation().samples, calibrated.variation().samples, "{name}");
         let told = predict(&again, &recordings[0], None).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert!(
-            (told.rms_m.expect("lengths") - with).abs() < 1e-3 * with + 1e-11,
+            (told.rms.m.expect("lengths") - with).abs() < 1e-3 * with + 1e-11,
             "{name}: {told:?} {with:e}"
         );
         assert_eq!(told.unseen_directions, 0);
@@ -131,11 +131,11 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
         let point = ["tool_point[mm]: 20,30,-90".to_string()];
         let simulated = open(&machine, &recording(&again, &instrument, &path(&machine, 150), &point, 1));
         let told = predict(&again, &simulated[0], None).unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert!(told.max_m.expect("lengths") < 2e-11, "{name}: {told:?}");
+        assert!(told.max.m.expect("lengths") < 2e-11, "{name}: {told:?}");
         let constant =
             CalibratedMachine::nominal(machine.clone()).with_deviations(again.deviations().to_vec());
         let told = predict(&constant, &simulated[0], None).unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert!(told.rms_m.expect("lengths") > 5e-7, "{name}: {told:?}");
+        assert!(told.rms.m.expect("lengths") > 5e-7, "{name}: {told:?}");
     }
 }
 
@@ -194,7 +194,7 @@ fn a_pattern_that_was_never_seen_is_told_and_predicted_from_single_directions() 
     let told = predict(&calibrated, &judge[0], None).unwrap_or_else(|e| panic!("{e}"));
     assert!(told.unseen_directions > 100, "{told:?}");
     // The prior shares a little of it out to what goes with both axes; the play itself makes 6 um.
-    assert!(told.max_m.expect("lengths") < 1e-6, "{told:?}");
+    assert!(told.max.m.expect("lengths") < 1e-6, "{told:?}");
 }
 
 #[test]
@@ -242,8 +242,8 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
         };
         let terms = vec![
             part(Slot::Before(j), joint.twist(), Feature::half_direction(j)),
-            part(Slot::Carried(j), behind, Feature::position(j).times(Feature::position(j))),
-            part(Slot::Reading(1), Twist::zero(0.0), Feature::position(last)),
+            part(Slot::After(j), behind, Feature::position(j).times(Feature::position(j))),
+            part(Slot::Reading, Twist::from_array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), Feature::position(last)),
         ];
         let model = Model {
             varying: Varying { directions: None, terms },
@@ -252,7 +252,7 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
         };
         let (_, fit) = calibrate_model(&machine, &recordings, &model, exact(), &|_| {})
             .unwrap_or_else(|e| panic!("{name}: {e}"));
-        let rms = fit.rms_m.expect("lengths").geometric;
+        let rms = fit.rms.m.expect("lengths").geometric;
         assert!(rms < 2e-8, "{name}: {rms:e} {} {:?} {:?}", fit.stop, fit.coefficients, fit.recordings);
         let found: Vec<f64> = fit.coefficients.iter().map(|c| c.value).collect();
         // To half a percent: the prior holds the geometry, and the terms have to make up for that.

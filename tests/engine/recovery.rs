@@ -133,11 +133,11 @@ fn predictions_at_new_poses_are_as_good_as_the_noise_allows_with_deviations_of_f
             let learnt = [record(&instrument, seed + 2)];
             let (calibrated, fit) =
                 calibrate(&machine, &learnt, Options::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
-            let noise = instrument.noise_m;
-            (instrument.noise_m, instrument.noise_rad) = (0.0, 0.0);
+            let noise = instrument.noise.m;
+            (instrument.noise.m, instrument.noise.rad) = (0.0, 0.0);
             let new = record(&instrument, seed + 4);
             let error =
-                predict(&calibrated, &new, None).unwrap_or_else(|e| panic!("{e}")).rms_m.expect("lengths");
+                predict(&calibrated, &new, None).unwrap_or_else(|e| panic!("{e}")).rms.m.expect("lengths");
             let values = if sensor == (Sensor::Distance { absolute: false }) { 1.0 } else { 3.0f64 };
             let expected = noise * values.sqrt() * (fit.information.used / fit.readings as f64).sqrt();
             println!("{name:<26} {sensor:?}: {:.2} of what the noise allows", error / expected);
@@ -195,7 +195,7 @@ fn the_named_solvers_do_what_their_names_say() {
         [Recording::from_bytes("d.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))];
     let run =
         |solver| calibrate(&machine, &recordings, Options { solver, loss: Loss::Squares, prior: false });
-    let rms = |solver| run(solver).map(|(_, fit)| fit.rms_m.expect("lengths").geometric);
+    let rms = |solver| run(solver).map(|(_, fit)| fit.rms.m.expect("lengths").geometric);
     let best = rms(Solver::LevenbergMarquardt).unwrap_or_else(|e| panic!("{e}"));
     // Damping only delays in these directions; truncation at 1e-9 cuts nothing that is seen.
     let truncated = rms(Solver::RankTruncation { cut: 1e-6 }).unwrap_or_else(|e| panic!("{e}"));

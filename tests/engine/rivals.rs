@@ -6,11 +6,10 @@ use crate::common;
 use kincal::identify::{Loss, Options, Solver, calibrate};
 use kincal::lie::{Twist, Vec3};
 use kincal::recording::Recording;
-use kincal::rivals::{
-    Arena, Form, Kalman, KalmanOptions, Noise, Rival, Scheme, Step, Tuning, against_truth, split,
-};
+use kincal::rivals::{Arena, Form, Kalman, KalmanOptions, Rival, Scheme, Step, Tuning, against_truth, split};
 use kincal::sensor::Sensor;
 use kincal::simulate::{Instrument, random_commands, random_deviations, recording};
+use kincal::units::ByQuantity;
 use kincal::{CalibratedMachine, Error, Machine};
 
 /// A machine with known deviations, and a recording of it.
@@ -207,7 +206,8 @@ fn the_filter_finds_the_length_of_a_bar_and_the_zero_of_an_indicator() {
 fn the_covariance_shrinks_with_every_sample_and_stays_positive() {
     let machine = common::machine("six_r_arm");
     let (_, recording) = measured(&machine, 0.3, Sensor::Pose, (1e-5, 1e-5), 60, &[]);
-    let options = KalmanOptions { noise: Some(Noise { m: 1e-5, rad: 1e-5 }), ..KalmanOptions::default() };
+    let options =
+        KalmanOptions { noise: Some(ByQuantity { m: 1e-5, rad: 1e-5 }), ..KalmanOptions::default() };
     let mut filter = Kalman::new(&machine, options);
     let stream = filter.open(recording.header()).unwrap_or_else(|e| panic!("{e}"));
     let mut before = f64::INFINITY;
@@ -251,7 +251,8 @@ fn the_filter_takes_little_from_a_sample_that_lies_far_off() {
         let model = filter.calibrated();
         kincal::rivals::residuals(&model, std::slice::from_ref(&recording))
             .unwrap_or_else(|e| panic!("{e}"))
-            .mean_m
+            .mean
+            .m
             .expect("lengths")
     };
     let clean = run(Loss::Squares, 0.0);
@@ -377,7 +378,7 @@ fn every_named_rival_gives_a_verdict_on_the_same_data() {
         assert!(verdict.failed.is_none(), "{name}: {:?}", verdict.failed);
         let judged = verdict.judged.expect("judged");
         assert_eq!(judged.samples, 300);
-        let mean = judged.mean_m.expect("lengths");
+        let mean = judged.mean.m.expect("lengths");
         println!("{name}: {mean:.2e} m, {:?}", verdict.truth);
         if name == "declared" {
             declared = mean;

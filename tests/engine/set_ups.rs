@@ -121,7 +121,7 @@ fn a_slip_without_a_clock_is_dated_by_the_order_of_samples() {
         said.model(&machine, &all, Options::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}")).to_ron();
     let model = CalibratedMachine::parse("slipped.ron", &model).unwrap_or_else(|e| panic!("{e}"));
     for recording in &all {
-        let rms = predict(&model, recording, None).unwrap_or_else(|e| panic!("{e}")).rms_m;
+        let rms = predict(&model, recording, None).unwrap_or_else(|e| panic!("{e}")).rms.m;
         assert!(rms.is_some_and(|rms| rms < 45e-6), "{}: {rms:?}", recording.name());
     }
 }
@@ -162,7 +162,7 @@ fn zeros_of_one_axis_that_come_anew_bring_those_of_the_others_into_the_model() {
     let model = said.model(&machine, known, Options::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(model.effects().len(), 1 + companions.len());
     let found = fit_setup(&model, new, Loss::Squares).unwrap_or_else(|e| panic!("{e}"));
-    let rms = predict(&found, &new[0], None).unwrap_or_else(|e| panic!("{e}")).rms_m;
+    let rms = predict(&found, &new[0], None).unwrap_or_else(|e| panic!("{e}")).rms.m;
     // 20 um in each of three directions.
     assert!(rms.is_some_and(|rms| rms < 1.1 * 3f64.sqrt() * 20e-6), "{rms:?}");
 }
@@ -232,7 +232,7 @@ fn ground_that_gives_way_belongs_to_its_set_up_and_is_found_again_in_a_new_one()
     assert_eq!(names(&said), [("ground_compliance", "column")]);
     // What belongs to a set-up is found again in the one that was left out.
     for one in &said.set_ups_left_out {
-        let rms = one.rms_m.expect("lengths");
+        let rms = one.rms.m.expect("lengths");
         assert!(rms.r#final < 45e-6 && rms.geometric > 1.5 * rms.r#final, "{one:?}");
     }
     assert_eq!(said.set_ups_left_out.len(), 2);
@@ -243,11 +243,11 @@ fn ground_that_gives_way_belongs_to_its_set_up_and_is_found_again_in_a_new_one()
     for found in [&found, &again] {
         let figures = predict(found, &new[0], None).unwrap_or_else(|e| panic!("{e}"));
         assert!(figures.left_out.is_empty(), "{:?}", figures.left_out);
-        assert!(figures.rms_m.is_some_and(|rms| rms < 60e-6), "{:?}", figures.rms_m);
+        assert!(figures.rms.m.is_some_and(|rms| rms < 60e-6), "{:?}", figures.rms.m);
     }
     // The set-ups that were known are as they were.
-    let before = predict(&model, &known[0], None).unwrap_or_else(|e| panic!("{e}")).rms_m;
-    let after = predict(&found, &known[0], None).unwrap_or_else(|e| panic!("{e}")).rms_m;
+    let before = predict(&model, &known[0], None).unwrap_or_else(|e| panic!("{e}")).rms.m;
+    let after = predict(&found, &known[0], None).unwrap_or_else(|e| panic!("{e}")).rms.m;
     assert_eq!(before, after);
 }
 
@@ -272,7 +272,7 @@ fn what_is_right_holds_in_a_set_up_left_out_and_a_meaningless_cause_does_not() {
     let setups: Vec<&str> = said.set_ups_left_out.iter().map(|one| one.setup.as_str()).collect();
     assert_eq!(setups, ["left", "right"]);
     for one in &said.set_ups_left_out {
-        let rms = one.rms_m.expect("lengths");
+        let rms = one.rms.m.expect("lengths");
         assert!(rms.r#final < 45e-6 && rms.geometric > 2.0 * rms.r#final, "{one:?}");
         assert!(rms.placebo.is_some_and(|placebo| placebo > 0.8 * rms.geometric), "{one:?}");
     }

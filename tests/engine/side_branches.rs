@@ -1,13 +1,13 @@
 //! What hangs on a machine beside the chain that is measured: it weighs, its joints are columns, and it is left out where they are not.
 
 use crate::common;
+use kincal::CalibratedMachine;
 use kincal::Machine;
 use kincal::diagnose::{Diagnosis, Request, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
 use kincal::feature::{Binding, Expression, Feature, as_seen_in, samples_of};
 use kincal::predict::predict;
-use kincal::recording::Recording;
-use kincal::{CalibratedMachine, Error};
+use kincal::recording::{Recording, RecordingFault};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -140,7 +140,7 @@ fn a_sample_without_the_number_of_a_side_joint_is_a_drop_out() {
 fn a_side_joint_in_the_unit_of_a_length_is_refused() {
     let text = "# measurement: position\npost[deg],turn[deg],arm[deg],left.arm[mm],px[mm],py[mm],pz[mm]\n";
     let error = Recording::from_bytes("rec.csv", text.as_bytes(), &post()).expect_err("an angle");
-    assert!(matches!(error, Error::Recording { .. }), "{error}");
+    assert!(error.fault::<RecordingFault>().is_some(), "{error}");
     assert!(error.to_string().contains("left.arm"), "{error}");
 }
 
@@ -203,7 +203,7 @@ fn a_drive_that_twists_under_the_arm_that_is_not_measured_is_named() {
     let said = diagnosed(true);
     let names: Vec<_> = said.findings.iter().map(|f| (f.effect.as_str(), f.at.as_str())).collect();
     assert_eq!(names, [("gravity_compliance", "post")]);
-    let held_out = said.held_out_rms_m.expect("lengths");
+    let held_out = said.held_out_rms.m.expect("lengths");
     assert!(held_out.r#final < 0.1 * held_out.geometric, "{held_out:?}");
     assert!(said.unseen_side_branches.is_empty() && said.unexplained.is_none());
 }
@@ -213,6 +213,6 @@ fn where_nothing_says_how_the_other_arm_stood_that_is_told() {
     let said = diagnosed(false);
     assert_eq!(said.unseen_side_branches.len(), 1);
     assert_eq!(said.unseen_side_branches[0].columns, ["left.arm[rad]"]);
-    let held_out = said.held_out_rms_m.expect("lengths");
+    let held_out = said.held_out_rms.m.expect("lengths");
     assert!(held_out.r#final > 0.5 * held_out.geometric, "{held_out:?}");
 }

@@ -99,11 +99,11 @@ fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_
         let model =
             said.model(&machine, &known, Options::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
         let noise = 3f64.sqrt() * 1e-6;
-        let last = said.rms_m.expect("lengths").r#final;
+        let last = said.rms.m.expect("lengths").r#final;
         assert!((0.95 * noise..1.15 * noise).contains(&last), "{last}");
         let told = recording("rests.csv", 20.0, false, Some(side), Some(&rested));
         let rms = |of: &Recording| {
-            predict(&model, of, None).unwrap_or_else(|e| panic!("{e}")).rms_m.expect("lengths")
+            predict(&model, of, None).unwrap_or_else(|e| panic!("{e}")).rms.m.expect("lengths")
         };
         assert!(
             rms(&told) < 1.1 * noise && rms(&known[1]) > 5.0 * noise,

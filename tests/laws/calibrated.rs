@@ -28,10 +28,10 @@ fn calibrated_file_of_every_machine_comes_back_and_predicts_the_same() {
             assert!(gap < 1e-15, "{name}: {gap:e}");
         }
         let rms = |c: &CalibratedMachine| {
-            predict(c, &recordings[0], None).unwrap_or_else(|e| panic!("{name}: {e}")).rms_m.expect("lengths")
+            predict(c, &recordings[0], None).unwrap_or_else(|e| panic!("{name}: {e}")).rms.m.expect("lengths")
         };
         assert!((rms(&again) - rms(&calibrated)).abs() < 1e-12, "{name}");
-        assert!((rms(&calibrated) - fit.rms_m.expect("lengths").geometric).abs() < 1e-12, "{name}");
+        assert!((rms(&calibrated) - fit.rms.m.expect("lengths").geometric).abs() < 1e-12, "{name}");
         // A calibrated file is a machine file: whatever reads a machine reads it too.
         let as_machine = kincal::Machine::parse("again.ron", &text).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(&as_machine, calibrated.machine(), "{name}");

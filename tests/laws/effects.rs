@@ -4,12 +4,11 @@ use std::collections::BTreeSet;
 
 use crate::common;
 use kincal::Machine;
-use kincal::effects::{
-    Candidate, Grid, Identified, Library, Place, Range, RecordingFacts, Slot, StoredEffect,
-};
+use kincal::effects::{Candidate, Grid, Identified, Library, Place, Range, RecordingFacts, StoredEffect};
 use kincal::feature::{Samples, samples_of};
 use kincal::machine::JointKind;
 use kincal::recording::Recording;
+use kincal::variation::Slot;
 
 /// A recording in which every joint moves to and fro within its travel, with time and every channel that families ask for.
 fn recording(machine: &Machine, samples: usize, with_time: bool) -> Recording {

@@ -157,7 +157,7 @@ fn what_a_recording_cannot_use_is_left_out_and_told() {
     let told = with(&machine, names.map(of).to_vec());
     let left = |recording: &Recording| -> Vec<String> {
         let figures = predicted(&told, recording).0;
-        assert!(figures.rms_m.is_some_and(f64::is_finite));
+        assert!(figures.rms.m.is_some_and(f64::is_finite));
         figures.left_out.into_iter().map(|l| l.effect).collect()
     };
     assert!(left(&path(&machine, "distance", true)).is_empty());
@@ -202,7 +202,7 @@ fn a_machine_that_leans_is_found_with_its_weights_hanging_plumb() {
         read(header("# workpiece_frame: unknown\n", [0.0, 0.0, -1.0]) + &commands_and(&body(&text), plumb));
     let found = kincal::identify::fit_setup(&told, std::slice::from_ref(&leaning), Default::default())
         .unwrap_or_else(|e| panic!("{e}"));
-    let rms = predicted(&found, &leaning).0.rms_m.expect("positions");
+    let rms = predicted(&found, &leaning).0.rms.m.expect("positions");
     assert!(rms < 1e-7, "{rms} m are left of readings without noise");
 }
 

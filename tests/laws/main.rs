@@ -18,4 +18,5 @@ mod lie;
 mod machines;
 mod nc;
 mod recordings;
+mod rooms;
 mod simulate;

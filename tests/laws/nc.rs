@@ -314,9 +314,7 @@ fn a_line_without_end_is_refused_with_its_number() {
         let last = program.by_ref().last().expect("blocks");
         let error = last.expect_err("too long");
         assert_eq!(error.place().map(|p| p.line), Some(before + 1));
-        assert!(
-            matches!(&error, Error::Nc { fault, .. } if **fault == NcFault::LineTooLong { limit: LONGEST_LINE })
-        );
+        assert_eq!(error.fault(), Some(&NcFault::LineTooLong { limit: LONGEST_LINE }));
         assert!(program.next().is_none());
     }
     let just = "(".repeat(LONGEST_LINE - 1) + "\n";

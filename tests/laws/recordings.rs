@@ -299,10 +299,8 @@ fn faults_name_line_and_column() {
         let place = error.place().expect("a place");
         assert_eq!((place.line, place.column), (line, column), "{error}");
     }
-    let Error::Recording { fault, .. } = bad("time_backwards.csv") else {
-        panic!("a fault of the recording")
-    };
-    assert_eq!(*fault, RecordingFault::TimeBackwards { from: 0.1, to: 0.05 });
+    let error = bad("time_backwards.csv");
+    assert_eq!(error.fault(), Some(&RecordingFault::TimeBackwards { from: 0.1, to: 0.05 }));
 }
 
 /// The same cases on every run.

@@ -265,7 +265,7 @@ fn noise_has_the_statistics_that_it_is_said_to_have() {
         assert!(values.iter().flatten().all(|x| x.abs() * 1e6 <= largest));
     }
     let mut coarse = Instrument::new(Sensor::Displacement { direction_w: Vec3([1.0, 0.0, 0.0]) }, 1e-5, 0.0);
-    (coarse.resolution_m, coarse.drop_outs, coarse.outliers, coarse.outlier_m) = (4e-6, 0.1, 0.01, 1e-2);
+    (coarse.resolution.m, coarse.drop_outs, coarse.outliers, coarse.outlier.m) = (4e-6, 0.1, 0.01, 1e-2);
     let values = draw(&coarse, n);
     assert!(values.iter().flatten().all(|x| (x / 4e-6 - (x / 4e-6).round()).abs() < 1e-6));
     let dropped = values.iter().filter(|v| v.is_none()).count() as f64 / n as f64;

@@ -100,7 +100,7 @@ fn table_of(findings: &[Finding]) -> Markup {
                     td { (probability(finding.probability)) }
                     td.n { (format!("{:.0} %", 100.0 * finding.share)) }
                     td {
-                        @for (pair, angle) in [(finding.held_out_rms_m, false), (finding.held_out_rms_rad, true)] {
+                        @for (pair, angle) in [(finding.held_out_rms.m, false), (finding.held_out_rms.rad, true)] {
                             @if let Some(pair) = pair {
                                 (amount(pair.before, angle)) " → " (amount(pair.after, angle)) br;
                             }
@@ -261,7 +261,7 @@ fn pieces(line: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
 fn left(diagnosis: &Diagnosis, angle: bool) -> Markup {
     const HALF: usize = 20;
     const WIDTH: f64 = 0.25;
-    let noise = if angle { diagnosis.noise_floor_rad } else { diagnosis.noise_floor_m };
+    let noise = if angle { diagnosis.noise_floor.rad } else { diagnosis.noise_floor.m };
     let own = diagnosis.traces.recordings.iter().filter(|trace| trace.angle == angle);
     let left: Vec<f64> = own.flat_map(|trace| trace.r#final.iter().flatten().copied()).collect();
     let Some(noise) = noise.filter(|n| *n > 0.0 && !left.is_empty()) else { return html! {} };

@@ -118,11 +118,11 @@ fn head(diagnosis: &Diagnosis) -> String {
 /// Noise and root mean squares, a line each.
 pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
     let mut lines = Vec::new();
-    for (noise, angle) in both(diagnosis.noise_floor_m, diagnosis.noise_floor_rad) {
+    for (noise, angle) in both(diagnosis.noise_floor.m, diagnosis.noise_floor.rad) {
         lines.push(format!("noise of the readings: {}", amount(noise, angle)));
     }
     let found = !diagnosis.findings.is_empty();
-    for (rms, angle) in both(diagnosis.rms_m, diagnosis.rms_rad) {
+    for (rms, angle) in both(diagnosis.rms.m, diagnosis.rms.rad) {
         let RmsByModel { nominal, geometric, r#final } = rms;
         let mut line = format!(
             "RMS of the residuals: {} as declared -> {} with geometry calibrated",
@@ -135,7 +135,7 @@ pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
         lines.push(line);
     }
     for (HeldOutRms { geometric, r#final }, angle) in
-        both(diagnosis.held_out_rms_m, diagnosis.held_out_rms_rad)
+        both(diagnosis.held_out_rms.m, diagnosis.held_out_rms.rad)
     {
         let mut line = format!("on stretches left out of the fit: {}", amount(geometric, angle));
         if found {
@@ -157,7 +157,7 @@ fn set_ups(diagnosis: &Diagnosis) -> Vec<String> {
     let found = !diagnosis.findings.is_empty();
     let mut lines = Vec::new();
     for one in &diagnosis.set_ups_left_out {
-        for (LeftOutRms { geometric, r#final, placebo }, angle) in both(one.rms_m, one.rms_rad) {
+        for (LeftOutRms { geometric, r#final, placebo }, angle) in both(one.rms.m, one.rms.rad) {
             let mut line = format!("set-up {} left out of the fit: {}", one.setup, amount(geometric, angle));
             if found {
                 let _ = write!(line, " -> {}", amount(r#final, angle));
@@ -186,7 +186,7 @@ fn outliers(diagnosis: &Diagnosis) -> Vec<String> {
     let mut lines = Vec::new();
     for one in &diagnosis.outliers {
         let by: Vec<String> =
-            both(one.largest_m, one.largest_rad).into_iter().map(|(x, angle)| amount(x, angle)).collect();
+            both(one.largest.m, one.largest.rad).into_iter().map(|(x, angle)| amount(x, angle)).collect();
         let shown: Vec<String> = one.lines.iter().take(FEW_LINES).map(u64::to_string).collect();
         lines.push(format!(
             "outliers: {} of {}, off by up to {} ({} {}{}), left out of the fit",
@@ -198,7 +198,7 @@ fn outliers(diagnosis: &Diagnosis) -> Vec<String> {
             if one.lines.len() > FEW_LINES { " ..." } else { "" },
         ));
     }
-    let (m, rad) = (diagnosis.rms_without_outliers_m, diagnosis.rms_without_outliers_rad);
+    let (m, rad) = (diagnosis.rms_without_outliers.m, diagnosis.rms_without_outliers.rad);
     for (rms, angle) in both(m, rad) {
         let mut line = format!("RMS without the outliers: {} with geometry", amount(rms.geometric, angle));
         if !diagnosis.findings.is_empty() {
@@ -218,7 +218,7 @@ pub(crate) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
         probability(finding.probability),
         percent(finding.share)
     )];
-    for (HeldOutPair { before, after }, angle) in both(finding.held_out_rms_m, finding.held_out_rms_rad) {
+    for (HeldOutPair { before, after }, angle) in both(finding.held_out_rms.m, finding.held_out_rms.rad) {
         lines.push(format!(
             "held-out error: {} without it -> {} with it",
             amount(before, angle),

@@ -163,12 +163,12 @@ fn instrument(
     instrument.state.workpiece_point_w = balls.workpiece_point_w;
     instrument.state.length = balls.length + args.length_error.unwrap_or(0.0);
     instrument.state.zero = of("--zero", &args.zero)?.unwrap_or(0.0);
-    instrument.resolution_m = args.resolution.unwrap_or(0.0);
-    instrument.resolution_rad = args.resolution_angle.unwrap_or(0.0);
+    instrument.resolution.m = args.resolution.unwrap_or(0.0);
+    instrument.resolution.rad = args.resolution_angle.unwrap_or(0.0);
     instrument.drop_outs = args.drop_outs.unwrap_or(0.0);
     instrument.outliers = args.outliers.unwrap_or(0.0);
-    instrument.outlier_m = args.outlier_size.unwrap_or(0.0);
-    instrument.outlier_rad = instrument.outlier_m / 0.1;
+    instrument.outlier.m = args.outlier_size.unwrap_or(0.0);
+    instrument.outlier.rad = instrument.outlier.m / 0.1;
     let claims = Claims {
         setup: args.setup.clone(),
         frame_unknown: args.frame_unknown,

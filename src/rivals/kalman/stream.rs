@@ -111,7 +111,7 @@ impl Kalman {
         let of = |i: usize| {
             let quantity = self.quantity(sensor, i);
             let stated = header.sigma.filter(|s| s.quantity == quantity).map(|s| s.value);
-            let given = self.options.noise.map(|n| if quantity == Quantity::Angle { n.rad } else { n.m });
+            let given = self.options.noise.map(|n| n[quantity]);
             stated.or(given).filter(|s| *s > 0.0 && s.is_finite()).ok_or_else(|| Error::Undetermined {
                 what: "a filter needs the noise of the instrument, and the recording states none".into(),
                 mend: "add `# sigma[um]: ...` to the head of the recording, or give the noise".into(),

@@ -21,7 +21,7 @@ fn optimum_of_42_redundant_parameters_is_reached() {
     for solver in [Solver::LevenbergMarquardt, Solver::RankTruncation { cut: 1e-8 }] {
         let options = Options { solver, loss: Loss::Squares, prior: false };
         let (_, fit) = calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}"));
-        let rms = fit.rms_m.expect("lengths").geometric;
+        let rms = fit.rms.m.expect("lengths").geometric;
         let sum = rms * rms * fit.samples as f64;
         println!(
             "{solver:?}: {sum:.12e} m², {:+.1e} of the optimum, {} steps",

@@ -9,12 +9,12 @@ use std::sync::LazyLock;
 
 use super::sets::{Fold, Set, axes, hilti, justin, justin_with_both_arms, kuka, pandas};
 use kincal::CalibratedMachine;
-use kincal::effects::{Candidate, Library, RecordingFacts, Slot as EffectSlot};
+use kincal::effects::{Candidate, Library, RecordingFacts};
 use kincal::feature::samples_of;
 use kincal::identify::{Model, Options, calibrate_model, fit_setup};
 use kincal::predict::predict;
 use kincal::recording::Recording;
-use kincal::variation::{Part, Slot, Term, Varying};
+use kincal::variation::{Part, Term, Varying};
 use rayon::prelude::*;
 
 /// Coefficients may be this many usual sizes large.
@@ -78,11 +78,7 @@ fn terms(set: &Set, library: &Library, asked: &str) -> (Varying, Vec<String>) {
                     continue;
                 }
                 let parts = (coefficient.parts.iter()).map(|p| Part {
-                    slot: match p.slot {
-                        EffectSlot::Before(j) => Slot::Before(j),
-                        EffectSlot::After(j) => Slot::Carried(j),
-                        EffectSlot::Reading => Slot::Reading(0),
-                    },
+                    slot: p.slot,
                     direction: p.direction,
                     feature: feature(p.feature),
                 });
@@ -111,7 +107,7 @@ fn terms(set: &Set, library: &Library, asked: &str) -> (Varying, Vec<String>) {
 fn squares(calibrated: &CalibratedMachine, recordings: &[Recording]) -> (f64, u64) {
     recordings.iter().fold((0.0, 0), |(sum, count), recording| {
         let found = predict(calibrated, recording, None).unwrap_or_else(|e| panic!("{e}"));
-        let rms = found.rms_m.map(|m| 1e3 * m).or(found.rms_rad.map(|r| 1e3 * r.to_degrees()));
+        let rms = found.rms.m.map(|m| 1e3 * m).or(found.rms.rad.map(|r| 1e3 * r.to_degrees()));
         (sum + rms.expect("readings").powi(2) * found.samples as f64, count + found.samples)
     })
 }

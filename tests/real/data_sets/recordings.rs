@@ -23,7 +23,7 @@ struct Figures {
 fn rms(calibrated: &CalibratedMachine, recordings: &[Recording]) -> (f64, u64) {
     recordings.iter().fold((0.0, 0), |(sum, count), recording| {
         let found = predict(calibrated, recording, None).unwrap_or_else(|e| panic!("{e}"));
-        let mm = 1e3 * found.rms_m.expect("positions");
+        let mm = 1e3 * found.rms.m.expect("positions");
         (sum + mm * mm * found.samples as f64, count + found.samples)
     })
 }
@@ -53,7 +53,7 @@ fn cross_validate(set: &Set, folds: &[Fold], machine: &Machine, options: Options
 fn figures(set: &Set, options: Options) -> Figures {
     let (_, fit) =
         calibrate(&set.machine, &set.whole(), options).unwrap_or_else(|e| panic!("{}: {e}", set.name));
-    let all = fit.rms_m.expect("positions");
+    let all = fit.rms.m.expect("positions");
     let (held_out_nominal, held_out) = cross_validate(set, &set.folds(), &set.machine, options);
     let figures =
         Figures { nominal: 1e3 * all.nominal, geometric: 1e3 * all.geometric, held_out_nominal, held_out };

@@ -1,0 +1,175 @@
+//! Imports run one way, both between the rooms of the crate, as `src/lib.rs` lists them, and between the files of one room.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Every Rust file under a folder, sorted.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("a folder of the sources") {
+        let path = entry.expect("readable").path();
+        match path.is_dir() {
+            true => found.extend(files(&path)),
+            false => found.extend(path.extension().is_some_and(|e| e == "rs").then_some(path)),
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Modules that the lines `mod NAME;` of a text declare, in their order.
+fn declared(text: &str) -> Vec<String> {
+    let name = |line: &str| {
+        let rest = line.trim_start_matches("pub(crate) ").trim_start_matches("pub ").strip_prefix("mod ")?;
+        rest.strip_suffix(';').map(str::to_string)
+    };
+    text.lines().filter_map(name).collect()
+}
+
+/// Rooms in the order of the table in the crate's documentation: links to modules in its first column.
+fn listed(text: &str) -> Vec<String> {
+    let rows = text.lines().filter_map(|line| line.strip_prefix("//! | "));
+    let names = rows.filter_map(|row| row.split(" | ").next()).filter(|cell| cell.contains('`'));
+    names
+        .flat_map(|cell| cell.split('`').skip(1).step_by(2).map(str::to_string).collect::<Vec<_>>())
+        .collect()
+}
+
+/// First segments of all paths in a text that begin with `root::`, groups in braces taken apart; comments and tests left out.
+fn imported(text: &str, root: &str) -> BTreeSet<String> {
+    let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    let code: String =
+        text.lines().filter(|line| !line.trim_start().starts_with("//")).flat_map(|l| [l, "\n"]).collect();
+    let mut names = BTreeSet::new();
+    let root = format!("{root}::");
+    for (at, _) in code.match_indices(&root) {
+        let before = code[..at].chars().next_back();
+        if before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':') {
+            continue;
+        }
+        let rest = &code[at + root.len()..];
+        let word =
+            |text: &str| text.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+        let Some(group) = rest.strip_prefix('{') else {
+            names.insert(word(rest));
+            continue;
+        };
+        let (mut depth, mut item) = (0, String::new());
+        for c in group.chars() {
+            match c {
+                '{' => depth += 1,
+                '}' if depth == 0 => break,
+                '}' => depth -= 1,
+                ',' if depth == 0 => {
+                    names.insert(word(&std::mem::take(&mut item)));
+                    continue;
+                }
+                _ => {}
+            }
+            item.push(c);
+        }
+        names.insert(word(&item));
+    }
+    names.remove("");
+    names
+}
+
+/// Imports that run up: file, room that it is in, room that it names.
+fn upward(rooms: &[String], sources: &[(String, String)]) -> Vec<String> {
+    let place = |room: &str| rooms.iter().position(|r| r == room);
+    let mut wrong = Vec::new();
+    for (file, text) in sources {
+        let own = file.split('/').next().unwrap_or_default().trim_end_matches(".rs");
+        let Some(here) = place(own) else { continue };
+        for name in imported(text, "crate") {
+            match place(&name) {
+                Some(there) if there <= here => {}
+                Some(_) => wrong.push(format!("{file}: `{own}` imports `{name}`, which stands behind it")),
+                None => wrong.push(format!("{file}: `crate::{name}` is no room; name the room it is in")),
+            }
+        }
+    }
+    wrong
+}
+
+fn sources() -> Vec<(String, String)> {
+    let root = source();
+    let name = |path: &Path| {
+        path.strip_prefix(&root).expect("under src").to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/")
+    };
+    files(&root).iter().map(|path| (name(path), read(path))).collect()
+}
+
+#[test]
+fn rooms_are_listed_once_and_all() {
+    let text = read(&source().join("lib.rs"));
+    let (listed, declared) = (listed(&text), declared(&text));
+    let sorted = |list: &[String]| list.iter().cloned().collect::<BTreeSet<_>>();
+    assert_eq!(sorted(&listed), sorted(&declared), "the table of rooms and the modules of src/lib.rs differ");
+    assert_eq!(listed.len(), sorted(&listed).len(), "a room is listed twice");
+}
+
+#[test]
+fn imports_run_one_way_between_rooms() {
+    let rooms = listed(&read(&source().join("lib.rs")));
+    let sources: Vec<_> =
+        sources().into_iter().filter(|(file, _)| !["lib.rs", "main.rs"].contains(&file.as_str())).collect();
+    let wrong = upward(&rooms, &sources);
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn an_import_that_runs_up_is_found() {
+    let rooms = ["lie", "machine", "chain"].map(String::from);
+    let file = |text: &str| [("machine/dyad.rs".to_string(), text.to_string())];
+    assert!(
+        upward(
+            &rooms,
+            &file("use crate::lie::{Pose, Twist};\n/// See `crate::chain::Chain`.\n// crate::chain")
+        )
+        .is_empty()
+    );
+    assert_eq!(upward(&rooms, &file("use crate::{lie::Pose, chain::{Chain, Sweep}};")).len(), 1);
+    assert_eq!(upward(&rooms, &file("fn f(chain: &crate::chain::Chain<f64>) {}")).len(), 1);
+    assert_eq!(upward(&rooms, &file("use crate::Machine;")).len(), 1);
+    assert!(upward(&rooms, &file("#[cfg(test)]\nmod tests { use crate::chain::Chain; }")).is_empty());
+}
+
+/// Files of one folder may not import each other in a circle; what a folder's head re-exports counts as the file that it comes from.
+#[test]
+fn imports_run_one_way_within_every_room() {
+    let sources = sources();
+    let mut folders: BTreeMap<String, Vec<(String, &str)>> = BTreeMap::new();
+    for (file, text) in &sources {
+        if let Some((folder, name)) = file.rsplit_once('/') {
+            folders.entry(folder.to_string()).or_default().push((name.trim_end_matches(".rs").into(), text));
+        }
+    }
+    let mut wrong = Vec::new();
+    for (folder, files) in &folders {
+        let names: BTreeSet<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+        let mut edges: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
+        for (name, text) in files {
+            let named = imported(text, "super").into_iter();
+            edges.insert(name, named.filter(|n| names.contains(n.as_str()) && n != name).collect());
+        }
+        // Take away whatever imports nothing that is still there; what cannot be taken away is in a circle or above one.
+        loop {
+            let free = edges.iter().find(|(_, to)| to.iter().all(|t| !edges.contains_key(t.as_str())));
+            match free.map(|(name, _)| *name) {
+                Some(name) => edges.remove(name),
+                None => break,
+            };
+        }
+        wrong.extend((!edges.is_empty()).then(|| format!("{folder}: {edges:?}")));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
