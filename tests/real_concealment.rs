@@ -345,7 +345,7 @@ fn what_is_concealed_in_real_recordings_is_named_and_their_own_findings_stay() {
 }
 
 /// A joint gives way about its axis and across it: two effects, told as one. Both stay at their joint, or move to another together
-/// (`docs/diagnosis.md` (80)).
+/// (`docs/diagnosis-method.md` (80)).
 #[test]
 fn weight_is_told_of_its_own_joint_beside_counts_that_its_encoder_lost() {
     let (stem, folder, files) = SETS[6];

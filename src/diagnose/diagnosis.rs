@@ -16,7 +16,7 @@ use crate::effects::StoredEffect;
 use crate::identify::BeforeAfter;
 use crate::location::LocationErrors;
 
-/// Everything that a diagnosis has to say. Numbers in SI; `docs/diagnosis.md` lists the fields.
+/// Everything that a diagnosis has to say. Numbers in SI; `docs/commands.md` lists the fields.
 #[derive(Clone, Debug, Serialize)]
 pub struct Diagnosis {
     /// Name of the machine.
