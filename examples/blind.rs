@@ -3,7 +3,7 @@
 //! ```text
 //! cargo run --release --example blind -- --write DIR --kind standard --count 40 --seed 1
 //! cargo run --release --example blind -- --judge DIR --kind standard
-//! cargo run --release --example blind -- --report docs/diagnosis.md --count 200 --seed 1
+//! cargo run --release --example blind -- --report docs/benchmarks.md --count 200 --seed 1
 //! ```
 
 #[path = "../tests/blind/mod.rs"]
@@ -179,7 +179,7 @@ fn report(arguments: &Arguments) -> Result<String, String> {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "Written by `cargo run --release --example blind -- --report docs/diagnosis.md --count {count} --seed {seed}`.\n"
+        "Written by `cargo run --release --example blind -- --report docs/benchmarks.md --count {count} --seed {seed}`.\n"
     );
     let made = both(&folder, &machine_folder(arguments), &engine, count, seed, &mut out);
     let _ = std::fs::remove_dir_all(&folder);

@@ -1,7 +1,7 @@
 //! Structure along a joint's travel that no family's shape is needed for: is what is left a function of where the joint stands?
 //!
 //! Settled positions follow each other in no order, so that nothing smooth runs through them; but an error of a joint's own motion is one
-//! function of its position, whatever that looks like, `docs/diagnosis.md` (65).
+//! function of its position, whatever that looks like, `docs/diagnosis-method.md` (65).
 
 use nalgebra::{DMatrix, DVector};
 

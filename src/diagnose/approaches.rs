@@ -1,4 +1,4 @@
-//! From which side a joint came that stands still all through a recording, as the readings say it: `docs/diagnosis.md` (73).
+//! From which side a joint came that stands still all through a recording, as the readings say it: `docs/diagnosis-method.md` (73).
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
 //! What comes anew with every set-up comes so at several joints, since axes are referenced together, and every joint gives way under
-//! weight: `docs/diagnosis.md` (72).
+//! weight: `docs/diagnosis-method.md` (72).
 
 use std::sync::Arc;
 

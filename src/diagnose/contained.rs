@@ -1,5 +1,5 @@
 //! Names that say the same as a wider one that adds next to nothing: a scale that is off by 3000 ppm and bends by 10 is a scale error.
-//! And wider names that add nothing to what has another name, `docs/diagnosis.md` (78).
+//! And wider names that add nothing to what has another name, `docs/diagnosis-method.md` (78).
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,5 @@
-//! The way of one joint through all recordings, and what an error that depends on this joint alone may be, `docs/diagnosis.md` (69).
+//! The way of one joint through all recordings, and what an error that depends on this joint alone may be,
+//! `docs/diagnosis-method.md` (69).
 
 use super::curves::{column, product};
 use super::series::{Motion, Series, over_range, series, smooth, unit};

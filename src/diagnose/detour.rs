@@ -1,4 +1,4 @@
-//! Another way to the same recordings: without the effect that came first, `docs/diagnosis.md` (79).
+//! Another way to the same recordings: without the effect that came first, `docs/diagnosis-method.md` (79).
 
 use std::cell::RefCell;
 

@@ -19,7 +19,7 @@ use crate::units::{ByQuantity, field_by_quantity};
 
 field_by_quantity!(noise_floor, rms, held_out_rms, rms_without_outliers);
 
-/// Everything that a diagnosis has to say. Numbers in SI; `docs/diagnosis.md` lists the fields.
+/// Everything that a diagnosis has to say. Numbers in SI; `docs/commands.md` lists the fields.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Name of the machine.

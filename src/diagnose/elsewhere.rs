@@ -1,4 +1,4 @@
-//! All that is told as one effect of a joint, at another joint together, `docs/diagnosis.md` (80).
+//! All that is told as one effect of a joint, at another joint together, `docs/diagnosis-method.md` (80).
 
 use super::search::{Active, Search};
 use crate::effects::Place;

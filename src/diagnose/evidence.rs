@@ -1,4 +1,4 @@
-//! Evidence of columns whose coefficients are normal with the sizes usual on machines, `docs/diagnosis.md` (63).
+//! Evidence of columns whose coefficients are normal with the sizes usual on machines, `docs/diagnosis-method.md` (63).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 

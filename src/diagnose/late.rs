@@ -1,4 +1,4 @@
-//! Axes that are late: what depends on where an axis stands depends on where it is by then, `docs/diagnosis.md` (76).
+//! Axes that are late: what depends on where an axis stands depends on where it is by then, `docs/diagnosis-method.md` (76).
 
 use std::collections::BTreeMap;
 

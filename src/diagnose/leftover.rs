@@ -2,7 +2,7 @@
 //!
 //! Sums over blocks of whitened residuals have the variance of noise alone, whatever the length of the block; a misfit that runs
 //! smoothly along the path adds its energy. What oscillates is seen band by band: a stretch in which a band has far more power than
-//! noise has adds that, `docs/diagnosis.md` (65).
+//! noise has adds that, `docs/diagnosis-method.md` (65).
 
 use std::f64::consts::TAU;
 

@@ -14,7 +14,8 @@ use crate::variation::{Term, Varying};
 
 impl Diagnosis {
     /// Fits geometry and what was found together on the real model, where the search worked on its linearisation, and puts the
-    /// RMS that this leaves into the diagnosis. Nonlinear parameters (periods, time constants, places) stay where `docs/diagnosis.md` (74) has put them.
+    /// RMS that this leaves into the diagnosis. Nonlinear parameters (periods, time constants, places) stay where
+    /// `docs/diagnosis-method.md` (74) has put them.
     ///
     /// # Errors
     /// As [`calibrate_model`].

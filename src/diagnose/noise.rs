@@ -1,7 +1,7 @@
 //! The noise of the instrument: how large it is, how long it remembers, and which samples are no noise at all.
 //!
 //! Noise is judged by how much neighbouring readings differ, which a misfit that runs smoothly along the path does not touch;
-//! `docs/diagnosis.md` (60), (61).
+//! `docs/diagnosis-method.md` (60), (61).
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! How likely a name is among its rivals, and which of them are told with it, `docs/diagnosis.md` (64).
+//! How likely a name is among its rivals, and which of them are told with it, `docs/diagnosis-method.md` (64).
 
 use super::finding::Confusable;
 use super::search::{Rival, Search, VISIBLE};

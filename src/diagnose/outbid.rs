@@ -1,4 +1,4 @@
-//! Several names that one place without a name outbids: a patchwork, `docs/diagnosis.md` (77).
+//! Several names that one place without a name outbids: a patchwork, `docs/diagnosis-method.md` (77).
 
 use super::evidence::log_mean_exp;
 use super::search::{Active, Search};

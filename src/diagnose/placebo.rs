@@ -1,4 +1,4 @@
-//! What a cause that cannot be one does as well, `docs/diagnosis.md` (70).
+//! What a cause that cannot be one does as well, `docs/diagnosis-method.md` (70).
 
 use nalgebra::DMatrix;
 

@@ -1,5 +1,5 @@
 //! Parameters where nothing is left to be gained: Gauss and Newton with derivatives from dual numbers, coefficients, geometry and all
-//! other effects solved with them, `docs/diagnosis.md` (74).
+//! other effects solved with them, `docs/diagnosis-method.md` (74).
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,4 @@
-//! How well a candidate explains what is left: its evidence against chance, over its whole grid, `docs/diagnosis.md` (63) to (64).
+//! How well a candidate explains what is left: its evidence against chance, over its whole grid, `docs/diagnosis-method.md` (63) to (64).
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};

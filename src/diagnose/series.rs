@@ -1,5 +1,5 @@
-//! Series that structure without a name is foretold by: motions that a place can make, times functions of what it knows, `docs/diagnosis.md`
-//! (69).
+//! Series that structure without a name is foretold by: motions that a place can make, times functions of what it knows,
+//! `docs/diagnosis-method.md` (69).
 
 use std::f64::consts::PI;
 

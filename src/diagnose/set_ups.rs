@@ -1,4 +1,4 @@
-//! Set-ups that took no part in the fit: whether what was found holds where the machine stands otherwise, `docs/diagnosis.md` (71).
+//! Set-ups that took no part in the fit: whether what was found holds where the machine stands otherwise, `docs/diagnosis-method.md` (71).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};

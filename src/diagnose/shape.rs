@@ -1,7 +1,7 @@
 //! The shape of an effect as it may depart from the family's: the same motion, as another function of what the effect depends on.
 //!
 //! No play is quite a step and no worm quite a sine. What is left at the place of an effect because of that is taken for its shape and
-//! not for a second effect; and where the shape would have to be most of it, the name is wrong, `docs/diagnosis.md` (66).
+//! not for a second effect; and where the shape would have to be most of it, the name is wrong, `docs/diagnosis-method.md` (66).
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,4 +1,5 @@
-//! What is known already: geometry and the effects found so far, marginalised out of everything that is judged, `docs/diagnosis.md` (62).
+//! What is known already: geometry and the effects found so far, marginalised out of everything that is judged,
+//! `docs/diagnosis-method.md` (62).
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
 //! Waves that go by the sum of two joints' positions, as gears of a wrist do that turn with both: neither joint's own waves show them, nor
-//! slow waves of the one times slow waves of the other, `docs/diagnosis.md` (69).
+//! slow waves of the one times slow waves of the other, `docs/diagnosis-method.md` (69).
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,5 @@
-//! Several names in the place of a curve: what bends along a whole turn may be a line and the waves of an encoder, `docs/diagnosis.md` (75).
+//! Several names in the place of a curve: what bends along a whole turn may be a line and the waves of an encoder,
+//! `docs/diagnosis-method.md` (75).
 
 use std::sync::Arc;
 

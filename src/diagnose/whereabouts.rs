@@ -1,7 +1,7 @@
 //! Where structure without a name sits: which joint, frame or reading foretells most of it, whatever the law.
 //!
 //! Each place is asked with motions that it can make, times functions of what it knows: where the joint stands, the way it goes, how fast,
-//! the time. By their evidence they compete with each other and with the named effects that came nearest, `docs/diagnosis.md` (69).
+//! the time. By their evidence they compete with each other and with the named effects that came nearest, `docs/diagnosis-method.md` (69).
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Rows that depend on the ones before them, turned into independent ones, `docs/diagnosis.md` (61).
+//! Rows that depend on the ones before them, turned into independent ones, `docs/diagnosis-method.md` (61).
 
 use nalgebra::DMatrix;
 

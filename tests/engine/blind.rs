@@ -1,6 +1,6 @@
 //! The blind harness, reduced: laws of its generator and its scorer, and the engine on a few cases.
 //!
-//! The whole table: `cargo run --release --example blind -- --report docs/diagnosis.md`.
+//! The whole table: `cargo run --release --example blind -- --report docs/benchmarks.md`.
 
 use std::path::{Path, PathBuf};
 
@@ -224,7 +224,7 @@ fn judged(folder: &Path, machines: &Path, answers: &[serde_json::Value]) -> Scor
 const SEALED: [(u64, Option<Mode>, &[usize]); 2] =
     [(2026, None, &[11, 12, 18, 21, 27, 32, 37, 50, 52, 54]), (2027, Some(Mode::Clean), &[2, 15])];
 
-/// The engine on a few sealed cases; the figures of hundreds are in `docs/diagnosis.md`.
+/// The engine on a few sealed cases; the figures of hundreds are in `docs/benchmarks.md`.
 #[test]
 fn the_engine_names_what_a_few_blind_cases_conceal() {
     let folder = folder("engine");
