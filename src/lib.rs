@@ -101,6 +101,7 @@ pub mod sensor;
 pub mod simulate;
 pub mod units;
 pub mod variation;
+mod wording;
 
 pub use calibration::{CalibratedMachine, LeftOut};
 pub use chain::{Chain, Sweep};

@@ -1,5 +1,7 @@
 //! Why a program cannot be corrected as it stands, and the mend for each.
 
+use crate::wording::count;
+
 /// A block whose correction matters and cannot be written.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,7 +30,10 @@ pub enum CompensateFault {
         what: String,
     },
     /// A tolerance below what the written digits hold.
-    #[error("a tolerance of {tolerance_um} um cannot be held with {decimals} decimals")]
+    #[error(
+        "a tolerance of {tolerance_um} um cannot be held with {}",
+        count(*decimals as u64, "decimal", "decimals")
+    )]
     ArcTolerance {
         /// As asked for, um.
         tolerance_um: f64,

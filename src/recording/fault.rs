@@ -1,6 +1,7 @@
 //! What can be wrong with a recording, and the mend for each.
 
 use crate::units::{Quantity, UNITS, Unit};
+use crate::wording;
 
 /// A fault in a recording. Texts quoted from the file are cut short and shown without control characters.
 #[non_exhaustive]
@@ -251,7 +252,7 @@ pub enum RecordingFault {
         text: String,
     },
     /// A row with too few or too many fields.
-    #[error("row has {found} fields, header row has {expected}")]
+    #[error("row has {}, header row has {expected}", wording::count(*found as u64, "field", "fields"))]
     Ragged {
         /// In this row.
         found: usize,
@@ -290,7 +291,10 @@ pub enum RecordingFault {
     #[error("no data row follows the header row")]
     NoRows,
     /// Rows, but none that could be used.
-    #[error("all {rows} rows are drop-outs; column `{column}` is empty or NaN in {count} of them")]
+    #[error(
+        "{}; column `{column}` is empty or NaN in {count} of them",
+        if *rows == 1 { "the only row is a drop-out".into() } else { format!("all {rows} rows are drop-outs") }
+    )]
     AllDropped {
         /// Rows in the file.
         rows: u64,
@@ -300,7 +304,11 @@ pub enum RecordingFault {
         count: u64,
     },
     /// Two recordings to be joined that have not as many rows.
-    #[error("there are {rows} rows, and {other} has {other_rows}")]
+    #[error(
+        "there {} {}, and {other} has {other_rows}",
+        if *rows == 1 { "is" } else { "are" },
+        wording::count(*rows, "row", "rows")
+    )]
     JoinRows {
         /// Of this recording.
         rows: u64,
