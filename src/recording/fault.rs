@@ -291,10 +291,7 @@ pub enum RecordingFault {
     #[error("no data row follows the header row")]
     NoRows,
     /// Rows, but none that could be used.
-    #[error(
-        "{}; column `{column}` is empty or NaN in {count} of them",
-        if *rows == 1 { "the only row is a drop-out".into() } else { format!("all {rows} rows are drop-outs") }
-    )]
+    #[error("{}", all_dropped(*rows, column, *count))]
     AllDropped {
         /// Rows in the file.
         rows: u64,
@@ -329,6 +326,13 @@ pub enum RecordingFault {
         /// As written.
         name: String,
     },
+}
+
+fn all_dropped(rows: u64, column: &str, count: u64) -> String {
+    match rows {
+        1 => format!("the only row is a drop-out: column `{column}` is empty or NaN"),
+        _ => format!("all {rows} rows are drop-outs; column `{column}` is empty or NaN in {count} of them"),
+    }
 }
 
 impl RecordingFault {
