@@ -10,6 +10,7 @@ mod diagnose;
 mod join;
 mod location;
 mod output;
+mod part;
 mod predict;
 mod simulate;
 
@@ -62,7 +63,9 @@ pub(crate) struct Common {
 
 /// Runs the command line: 0 done, 1 input at fault, 2 usage.
 pub(crate) fn run() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    let command = Cli::parse().command;
+    part::tidy_when_interrupted();
+    let outcome = match command {
         Command::Describe(args) => describe::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),

@@ -36,6 +36,7 @@ mod effects;
 mod fault;
 mod follower;
 mod frame;
+mod gaps;
 mod model;
 mod report;
 mod setup;
@@ -63,6 +64,7 @@ use crate::machine::Machine;
 use crate::nc::{Dialect, Program, State};
 use calls::{Bounds, Calls};
 use follower::{Follower, put};
+use gaps::Gaps;
 
 /// How to write.
 #[derive(Clone, Copy, Debug, Default)]
@@ -162,15 +164,30 @@ fn run<R: BufRead>(
     if model.is_nominal() {
         return copy(machine, &mut open()?, out);
     }
-    let mut program = open()?;
-    let mut calls = Calls::default();
-    let dialect = program.dialect();
-    let mut bounds = Bounds::default();
-    while let Some(block) = program.next_block()? {
-        if let Some(name) = bounds.of(&block, dialect) {
-            calls.add(&name, &block);
+    match correct(machine, model, &open, setup, options, out) {
+        Err(error) if error.fault().is_some_and(Gaps::is_one) => {
+            let all = gaps(machine, model, &open, setup, options)?.together();
+            Err(match (error.place(), all) {
+                (Some(place), Some(all)) => Error::input(place.clone(), all),
+                _ => error,
+            })
         }
+        other => other,
     }
+}
+
+/// The passes of [`run`] over a program that needs any.
+fn correct<R: BufRead>(
+    machine: &Machine,
+    model: &mut dyn Model,
+    open: &dyn Fn() -> Result<Program<R>>,
+    setup: &Setup,
+    options: &Options,
+    out: &mut dyn Write,
+) -> Result<Report> {
+    let mut program = open()?;
+    let dialect = program.dialect();
+    let mut calls = sub_programs(&mut program)?;
     let mut first = vec![0; machine.commands().len()];
     if !model.keyed().is_empty() {
         let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
@@ -190,6 +207,40 @@ fn run<R: BufRead>(
     let mut report = follower.finish();
     report.blocks = blocks;
     Ok(report)
+}
+
+/// The sub-programs of a file.
+fn sub_programs<R: BufRead>(program: &mut Program<R>) -> Result<Calls> {
+    let (dialect, mut bounds, mut calls) = (program.dialect(), Bounds::default(), Calls::default());
+    while let Some(block) = program.next_block()? {
+        if let Some(name) = bounds.of(&block, dialect) {
+            calls.add(&name, &block);
+        }
+    }
+    Ok(calls)
+}
+
+/// All that the program needs of the set-up and the set-up does not say.
+fn gaps<R: BufRead>(
+    machine: &Machine,
+    model: &mut dyn Model,
+    open: &dyn Fn() -> Result<Program<R>>,
+    setup: &Setup,
+    options: &Options,
+) -> Result<Gaps> {
+    let mut calls = sub_programs(&mut open()?)?;
+    let mut program = open()?;
+    let (dialect, mut bounds) = (program.dialect(), Bounds::default());
+    let first = vec![0; machine.commands().len()];
+    let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
+    follower.gaps = Some(Gaps::default());
+    while let Some(mut block) = program.next_block()? {
+        if bounds.of(&block, dialect).is_none() {
+            // Whatever else is wrong with a block is told once the set-up is complete.
+            let _ = calls.block(&mut follower, &mut block, 0, &mut std::io::sink());
+        }
+    }
+    Ok(follower.gaps.unwrap_or_default())
 }
 
 /// One pass; how many blocks there are.

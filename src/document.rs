@@ -9,6 +9,7 @@ use ron::extensions::Extensions;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Place, Result};
+use crate::wording::count;
 
 /// Larger texts are refused: a machine is a few kilobytes.
 const MOST_BYTES: usize = 8 << 20;
@@ -183,9 +184,11 @@ fn explain(code: &ron::Error, guide: &str) -> (String, String) {
             guide.into(),
         ),
         ron::Error::ExpectedDifferentLength { expected, found } => {
-            let plural = if *found == 1 { "" } else { "s" };
             let expected = if expected == "a tuple of size 3" { "three numbers" } else { expected };
-            (format!("expected {expected}, found {found} element{plural}"), "write (x, y, z)".into())
+            (
+                format!("expected {expected}, found {}", count(*found as u64, "element", "elements")),
+                "write (x, y, z)".into(),
+            )
         }
         ron::Error::InvalidValueForType { expected, found } => {
             // RON calls a bare word a unit value.

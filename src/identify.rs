@@ -48,6 +48,7 @@ use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::units::Rms;
 use crate::variation::{Variation, Varying};
+use crate::wording;
 use evidence::Sizes;
 use information::Information as Info;
 use normal::{Noise, Normal, Sums, Tally};
@@ -161,8 +162,9 @@ fn attempt(
     if sources.readings() <= alone as u64 {
         return Err(Error::Undetermined {
             what: format!(
-                "{} scalar readings for {alone} unknowns of the set-ups: nothing is left to identify the machine from",
-                sources.readings()
+                "{} for {} of the set-ups: nothing is left to identify the machine from",
+                wording::count(sources.readings(), "scalar reading", "scalar readings"),
+                wording::count(alone as u64, "unknown", "unknowns")
             ),
             mend:
                 "record more poses, or declare what is known of the set-up (frame, tool point, zero, length)"
@@ -518,7 +520,11 @@ fn enough_for_setups(sources: &Sources) -> Result<()> {
                 (false, _) => "length",
             };
             return Err(Error::Undetermined {
-                what: format!("{has} scalar readings for the {needed} unknowns of {name} ({of})"),
+                what: format!(
+                    "{} for the {} of {name} ({of})",
+                    wording::count(has, "scalar reading", "scalar readings"),
+                    wording::count(needed, "unknown", "unknowns")
+                ),
                 mend: mend(),
             });
         }
@@ -527,7 +533,10 @@ fn enough_for_setups(sources: &Sources) -> Result<()> {
         let has = readings(&|s| s.tool_point.unknown() == Some(point) && s.sees_frames());
         if (1..3).contains(&has) {
             return Err(Error::Undetermined {
-                what: format!("{has} scalar readings for the 3 coordinates of tool point \"{name}\""),
+                what: format!(
+                    "{} for the 3 coordinates of tool point \"{name}\"",
+                    wording::count(has, "scalar reading", "scalar readings")
+                ),
                 mend: mend(),
             });
         }

@@ -20,6 +20,7 @@
 //!
 //! | room | noun |
 //! | --- | --- |
+//! | `wording` | how messages word what they count |
 //! | `scalar` | [`Scalar`]: what kinematics is generic over, `f64` and dual numbers |
 //! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians |
 //! | [`units`] | units at the borders, and what lengths and angles have one of each |
@@ -111,6 +112,7 @@ pub mod sensor;
 pub mod simulate;
 pub mod units;
 pub mod variation;
+mod wording;
 
 pub use calibration::{CalibratedMachine, LeftOut};
 pub use chain::{Chain, Sweep};

@@ -329,7 +329,9 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
     let seen = fit.combinations.iter().filter(|c| c.share > 0.5).count();
     let _ = writeln!(
         text,
-        "\n{seen} combinations of deviations come mostly from the data, {} mostly from the tolerances",
+        "\n{} of deviations {} mostly from the data, {} mostly from the tolerances",
+        count(seen as u64, "combination", "combinations"),
+        if seen == 1 { "comes" } else { "come" },
         fit.combinations.len() - seen
     );
     text.push_str(&super::location::render_location_errors(&fit.location_errors));

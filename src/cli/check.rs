@@ -8,7 +8,7 @@ use kincal::check::{PASS, check};
 use serde_json::json;
 
 use super::Common;
-use super::output::{Failure, Outcome, check_outputs, open_machine, table};
+use super::output::{Failure, Outcome, check_outputs, count, open_machine, table};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -35,9 +35,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let worst = checks.iter().map(|c| c.worst).fold(0.0, f64::max);
     let passes = checks.iter().all(|c| c.passes());
     let mut text = format!(
-        "{}: analytic Jacobians against forward-mode autodiff, {} random poses each\n",
+        "{}: analytic Jacobians against forward-mode autodiff, {} each\n",
         machine.name(),
-        args.poses
+        count(args.poses.into(), "random pose", "random poses")
     );
     let mut rows = vec![
         ["measurement", "by", "deviations", "worst difference relative to its block"]

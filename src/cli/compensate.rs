@@ -141,6 +141,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     args.common.write_json(&report)
 }
 
+/// What is less is the rounding of the calculation, m or rad.
+const NOTHING: f64 = 1e-11;
+
 fn at(worst: Worst, show: fn(f64) -> String) -> String {
     match worst.line {
         0 => show(worst.value),
@@ -210,12 +213,16 @@ fn notes(r: &Report) -> String {
     for held in &r.held {
         let _ = writeln!(text, "note: {} at {}: {}", held.effect, held.at, held.because);
     }
-    if r.reversals.count > 0 {
+    let tip_steps = r.largest_reversal_m.value > NOTHING;
+    if tip_steps || r.reversals.first.iter().any(|x| x.step_rad > NOTHING) {
         let _ = writeln!(
             text,
-            "note: the correction steps at {} where a direction of travel changes, by {} at most: {}",
+            "note: the correction steps at {} where a direction of travel changes, {}: {}",
             count(r.reversals.count, "block", "blocks"),
-            at(r.largest_reversal_m, length),
+            match tip_steps {
+                true => format!("by at most {}", at(r.largest_reversal_m, length)),
+                false => "of the tool axis alone".into(),
+            },
             lines(&r.reversals, |x| x.line)
         );
     }
@@ -255,9 +262,12 @@ fn notes(r: &Report) -> String {
     if r.cycles > 0 {
         let _ = writeln!(
             text,
-            "note: {} corrected in the plane only, which leaves {} at most",
+            "note: {} corrected in the plane only, which leaves {}",
             count(r.cycles, "drilling cycle", "drilling cycles"),
-            at(r.largest_cycle_m, length)
+            match r.largest_cycle_m.value > NOTHING {
+                true => format!("at most {}", at(r.largest_cycle_m, length)),
+                false => "nothing".into(),
+            }
         );
     }
     if r.out_of_travel.count > 0 {
@@ -325,4 +335,29 @@ fn notes(r: &Report) -> String {
         None => {}
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use kincal::compensate::Reversal;
+
+    use super::*;
+
+    #[test]
+    fn what_is_nothing_is_not_told_as_0_um_at_most() {
+        let mut report = Report { cycles: 1, moves: 1, corrected_words: 1, ..Report::default() };
+        assert!(
+            notes(&report)
+                .contains("note: 1 drilling cycle corrected in the plane only, which leaves nothing\n")
+        );
+        report.reversals.count = 1;
+        report.reversals.first = vec![Reversal { line: 7, step_m: 1e-16, step_rad: 0.0 }];
+        assert!(!notes(&report).contains("steps"));
+        report.reversals.first[0].step_rad = 2e-6;
+        assert!(notes(&report).contains(
+            "steps at 1 block where a direction of travel changes, of the tool axis alone: line 7"
+        ));
+        report.largest_reversal_m = Worst { value: 3e-6, line: 7 };
+        assert!(notes(&report).contains("changes, by at most 3.00 um (line 7): line 7"));
+    }
 }

@@ -9,6 +9,7 @@ use kincal::recording::{Recording, open_all};
 use kincal::{Error, Machine, Place};
 
 use super::Common;
+use super::part::Part;
 
 /// Why a command ended with status 1.
 pub(crate) enum Failure {
@@ -212,21 +213,12 @@ pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> kin
         Some(_) => path.canonicalize().map_err(failed)?,
         None => path.to_path_buf(),
     };
-    let mut name = target.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".part{}", std::process::id()));
-    let part = target.with_file_name(name);
-    let result = (|| {
-        let file = std::fs::File::create(&part).map_err(failed)?;
-        if let Some(known) = &known {
-            file.set_permissions(known.permissions()).map_err(failed)?;
-        }
-        write_into(file, path, write)?;
-        std::fs::rename(&part, &target).map_err(failed)
-    })();
-    if result.is_err() {
-        let _ = std::fs::remove_file(&part);
+    let (part, file) = Part::begin(&target).map_err(failed)?;
+    if let Some(known) = &known {
+        file.set_permissions(known.permissions()).map_err(failed)?;
     }
-    result
+    write_into(file, path, write)?;
+    part.finish(&target).map_err(failed)
 }
 
 /// A spinner on standard error while something lasts; gone when it is dropped.

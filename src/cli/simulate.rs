@@ -53,7 +53,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
             written = session.record(out, |_| {
                 rows += 1;
                 if rows.is_multiple_of(20_000) {
-                    progress.say(&format!("{}: {rows} samples", file.display()));
+                    progress.say(&format!("{}: {}", file.display(), count(rows, "sample", "samples")));
                 }
             })?;
             Ok(())

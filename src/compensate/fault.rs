@@ -1,6 +1,7 @@
 //! Why a program cannot be corrected as it stands, and the mend for each.
 
 use crate::error::Fault;
+use crate::wording::count;
 
 /// A block whose correction matters and cannot be written.
 #[non_exhaustive]
@@ -30,7 +31,10 @@ pub enum CompensateFault {
         what: String,
     },
     /// A tolerance below what the written digits hold.
-    #[error("a tolerance of {tolerance_um} um cannot be held with {decimals} decimals")]
+    #[error(
+        "a tolerance of {tolerance_um} um cannot be held with {}",
+        count(*decimals as u64, "decimal", "decimals")
+    )]
     ArcTolerance {
         /// As asked for, um.
         tolerance_um: f64,
@@ -67,6 +71,14 @@ pub enum CompensateFault {
     UnknownOffset {
         /// As the program calls it.
         name: String,
+    },
+    /// More than one of these two.
+    #[error("the correction depends on {}, which are not known", unknown(tools, offsets))]
+    UnknownSetup {
+        /// Tools without known length, as the program calls them, each with the first line that depends on it.
+        tools: Vec<(String, usize)>,
+        /// Work offsets without known numbers, likewise.
+        offsets: Vec<(String, usize)>,
     },
     /// A frame that is not followed.
     #[error("`{what}` changes what coordinates mean in a way that is not followed")]
@@ -116,9 +128,38 @@ fn without(axes: &[String]) -> String {
     format!(": the program has not placed {} before it", axes.join(", "))
 }
 
+/// `the lengths of tools 3 (line 8) and 7 (line 20), work offset G55 (line 8)`.
+fn unknown(tools: &[(String, usize)], offsets: &[(String, usize)]) -> String {
+    let some = |one: &str, many: &str, all: &[(String, usize)]| {
+        let each: Vec<String> = all.iter().map(|(name, line)| format!("{name} (line {line})")).collect();
+        let said = match each.split_last() {
+            None => return None,
+            Some((last, [])) => format!("{one} {last}"),
+            Some((last, others)) => format!("{many} {} and {last}", others.join(", ")),
+        };
+        Some(said)
+    };
+    let tools = some("the length of tool", "the lengths of tools", tools);
+    let offsets = some("work offset", "work offsets", offsets);
+    tools.into_iter().chain(offsets).collect::<Vec<_>>().join(", and on ")
+}
+
+/// The fields of a set-up that say how long these tools are.
+fn tools_field<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let each: Vec<String> = names.map(|name| format!("\"{name}\": LENGTH")).collect();
+    format!("tools: {{{}}}", each.join(", "))
+}
+
+/// The fields of a set-up that say where these work offsets lie.
+fn offsets_field<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let each: Vec<String> = names.map(|name| format!("\"{name}\": {{\"X\": ..., ...}}")).collect();
+    format!("work_offsets: {{{}}}", each.join(", "))
+}
+
 impl Fault for CompensateFault {
     fn mend(&self) -> String {
         use CompensateFault::*;
+        let in_setup = |fields: &str| format!("give --setup FILE.ron with `{fields}` (docs/compensate.md)");
         match self {
             Expression { .. } => "let the CAM system or an editor put the number in, then compensate".into(),
             UnknownStart { address } => format!("move `{address}` to an absolute place first (G90)"),
@@ -139,12 +180,14 @@ impl Fault for CompensateFault {
                 )
             }
             OtherMotion { .. } => "let the CAM system write it as G0, G1, G2, G3".into(),
-            UnknownTool { tool } => {
-                format!("give --setup FILE.ron with `tools: {{\"{tool}\": LENGTH}}` (docs/compensate.md)")
+            UnknownTool { tool } => in_setup(&tools_field([tool.as_str()].into_iter())),
+            UnknownOffset { name } => in_setup(&offsets_field([name.as_str()].into_iter())),
+            UnknownSetup { tools, offsets } => {
+                let tools = (!tools.is_empty()).then(|| tools_field(tools.iter().map(|t| t.0.as_str())));
+                let offsets =
+                    (!offsets.is_empty()).then(|| offsets_field(offsets.iter().map(|o| o.0.as_str())));
+                in_setup(&tools.into_iter().chain(offsets).collect::<Vec<_>>().join(", "))
             }
-            UnknownOffset { name } => format!(
-                "give --setup FILE.ron with `work_offsets: {{\"{name}\": {{\"X\": ..., ...}}}}` (docs/compensate.md)"
-            ),
             Frame { .. } => "let the CAM system write coordinates without this frame".into(),
             Call { what } => format!(
                 "put its blocks into this program; if it does not cut, give --setup FILE.ron with `calls: [\"{what}\"]`"

@@ -8,6 +8,7 @@ use super::control::Control;
 use super::correct::Left;
 use super::fault::CompensateFault;
 use super::frame::{self, Change, has_g};
+use super::gaps::Gaps;
 use super::model::Model;
 use super::report::Report;
 use super::setup::Setup;
@@ -76,6 +77,8 @@ pub(super) struct Follower<'a> {
     /// Why the next motion cannot be corrected.
     pub tool_fault: Option<CompensateFault>,
     offset_fault: Option<CompensateFault>,
+    /// Only looks what the set-up does not say; nothing is corrected.
+    pub gaps: Option<Gaps>,
     /// Behind M2 or M30.
     pub ended: bool,
 }
@@ -135,6 +138,7 @@ impl<'a> Follower<'a> {
             tool: Tool::default(),
             tool_fault: None,
             offset_fault: None,
+            gaps: None,
             ended: false,
         };
         follower.begin(setup);
@@ -385,6 +389,10 @@ impl<'a> Follower<'a> {
     }
 
     fn motion(&mut self, block: &mut Block, motion: &Motion, out: &mut dyn Write) -> Result<()> {
+        if let Some(gaps) = &mut self.gaps {
+            gaps.keep(block.line(), self.offset_fault.iter().chain(&self.tool_fault));
+            return Ok(());
+        }
         let target = self.target(block, motion)?;
         self.report.moves += 1;
         if let Some(fault) = self.offset_fault.as_ref().or(self.tool_fault.as_ref()) {

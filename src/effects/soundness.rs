@@ -4,6 +4,7 @@ use super::family::{Directions, Family, Grid, Meaning, Output, ParameterForm, Ra
 use crate::error::Fault;
 use crate::feature::{Dimension, Expression, Scope, dimension_of};
 use crate::machine::JointKind;
+use crate::wording::count;
 
 /// Most parameters of a family.
 const MOST_PARAMETERS: usize = 4;
@@ -69,7 +70,8 @@ pub(super) fn check(family: &Family) -> Checked<()> {
         ));
     }
     if family.least.is_some_and(|least| least == 0 || least > family.features.len()) {
-        let what = format!("at least {} of {} features", family.least.unwrap_or(0), family.features.len());
+        let features = count(family.features.len() as u64, "feature", "features");
+        let what = format!("at least {} of {features}", family.least.unwrap_or(0));
         return Err(("least".into(), fault(what, "write a number from 1 to the number of features")));
     }
     let numbers = [("often", family.often), ("size.um", family.size.um), ("size.urad", family.size.urad)];

@@ -3,6 +3,7 @@
 use super::solve::Problem;
 use super::{Fit, Solver, Stop};
 use crate::machine::Machine;
+use crate::wording::count;
 
 /// Deviations beyond so many tolerances are told.
 const CONTRADICTED: f64 = 5.0;
@@ -24,14 +25,15 @@ pub(super) fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     let needed = fit.rank.max(1) as u64;
     if fit.readings < 5 * needed {
         warnings.push(format!(
-            "{} readings for {needed} identifiable parameters: fewer than five each; record more poses, or the figures flatter themselves",
-            fit.readings
+            "{} for {}: fewer than five each; record more poses, or the figures flatter themselves",
+            count(fit.readings, "reading", "readings"),
+            count(needed, "identifiable parameter", "identifiable parameters")
         ));
     }
     if fit.rank < fit.rank_in_general {
         warnings.push(format!(
-            "these recordings see {} combinations of the unknowns; the same instrument on general poses would see {}{}",
-            fit.rank,
+            "these recordings see {} of the unknowns; the same instrument on general poses would see {}{}",
+            count(fit.rank as u64, "combination", "combinations"),
             fit.rank_in_general,
             still(machine, problem)
         ));
@@ -77,7 +79,7 @@ pub(super) fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
             names.join(", ")
         ));
     }
-    let samples = |n: u64| if n == 1 { "1 sample".to_string() } else { format!("{n} samples") };
+    let samples = |n: u64| count(n, "sample", "samples");
     if fit.outliers > 0 {
         let lies = if fit.outliers == 1 { "lies" } else { "lie" };
         warnings.push(format!("{} {lies} further off than noise explains", samples(fit.outliers)));

@@ -1,6 +1,7 @@
 //! What can be wrong with an NC program, and the mend for each.
 
 use crate::error::Fault;
+use crate::wording::count;
 
 /// A fault in an NC program, or in what should be written into one.
 #[non_exhaustive]
@@ -21,7 +22,7 @@ pub enum NcFault {
         first: usize,
     },
     /// A word that the block does not have.
-    #[error("block has {words} words, none with index {index}")]
+    #[error("block has {}, none with index {index}", count(*words as u64, "word", "words"))]
     NoSuchWord {
         /// The index asked for, from 0.
         index: usize,

@@ -2,6 +2,7 @@
 
 use crate::error::Fault;
 use crate::units::{Quantity, UNITS, Unit};
+use crate::wording;
 
 /// A fault in a recording. Texts quoted from the file are cut short and shown without control characters.
 #[non_exhaustive]
@@ -252,7 +253,7 @@ pub enum RecordingFault {
         text: String,
     },
     /// A row with too few or too many fields.
-    #[error("row has {found} fields, header row has {expected}")]
+    #[error("row has {}, header row has {expected}", wording::count(*found as u64, "field", "fields"))]
     Ragged {
         /// In this row.
         found: usize,
@@ -291,7 +292,7 @@ pub enum RecordingFault {
     #[error("no data row follows the header row")]
     NoRows,
     /// Rows, but none that could be used.
-    #[error("all {rows} rows are drop-outs; column `{column}` is empty or NaN in {count} of them")]
+    #[error("{}", all_dropped(*rows, column, *count))]
     AllDropped {
         /// Rows in the file.
         rows: u64,
@@ -301,7 +302,11 @@ pub enum RecordingFault {
         count: u64,
     },
     /// Two recordings to be joined that have not as many rows.
-    #[error("there are {rows} rows, and {other} has {other_rows}")]
+    #[error(
+        "there {} {}, and {other} has {other_rows}",
+        if *rows == 1 { "is" } else { "are" },
+        wording::count(*rows, "row", "rows")
+    )]
     JoinRows {
         /// Of this recording.
         rows: u64,
@@ -322,6 +327,13 @@ pub enum RecordingFault {
         /// As written.
         name: String,
     },
+}
+
+fn all_dropped(rows: u64, column: &str, count: u64) -> String {
+    match rows {
+        1 => format!("the only row is a drop-out: column `{column}` is empty or NaN"),
+        _ => format!("all {rows} rows are drop-outs; column `{column}` is empty or NaN in {count} of them"),
+    }
 }
 
 impl Fault for RecordingFault {

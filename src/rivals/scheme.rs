@@ -13,6 +13,7 @@ use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::sensor::Sensor;
 use crate::variation::CONSTANT;
+use crate::wording::count;
 
 /// A parameterisation with a step rule.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -141,7 +142,10 @@ fn not_finite(steps: usize) -> Error {
         };
     }
     Error::Undetermined {
-        what: format!("after {steps} steps the model has no finite readings: the scheme has run away"),
+        what: format!(
+            "after {} the model has no finite readings: the scheme has run away",
+            count(steps as u64, "step", "steps")
+        ),
         mend: "damp the step more, or truncate it".into(),
     }
 }

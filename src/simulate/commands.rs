@@ -8,6 +8,7 @@ use super::course::{At, Course, Sample, Samples};
 use crate::error::{Error, Place, Result};
 use crate::machine::{JointKind, Machine};
 use crate::units::{Quantity, Unit};
+use crate::wording::count;
 
 /// Longest line that is read, bytes.
 const LONGEST: u64 = 1 << 20;
@@ -221,7 +222,8 @@ impl CommandTable {
     fn sample(&self, line: usize, row: &str) -> Result<Option<Sample>> {
         let fields: Vec<&str> = row.trim_end().split(',').collect();
         if fields.len() != self.width {
-            let what = format!("row has {} fields, header row has {}", fields.len(), self.width);
+            let has = count(fields.len() as u64, "field", "fields");
+            let what = format!("row has {has}, header row has {}", self.width);
             return Err(self.wrong(line, 0, what, "separate the fields by commas; decimals take a point"));
         }
         let mut q: Vec<f64> = self.fixed.iter().map(|fixed| fixed.unwrap_or(f64::NAN)).collect();

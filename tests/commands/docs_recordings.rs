@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use crate::common;
-use kincal::CalibratedMachine;
+use kincal::identify::{BeforeAfter, Options, calibrate};
 use kincal::recording::Recording;
+use kincal::{CalibratedMachine, Machine};
 
 /// The fenced blocks of one language in a document.
 fn blocks(document: &str, language: &str) -> Vec<String> {
@@ -15,16 +16,21 @@ fn blocks(document: &str, language: &str) -> Vec<String> {
     text.split(&start).skip(1).map(cut).collect()
 }
 
+/// An example of a recording, with the machine that it names.
+fn recorded(example: &str) -> (Machine, Recording) {
+    let name = example.lines().next().and_then(|l| l.strip_prefix("# machine: ")).expect("a machine first");
+    let machine = common::machine(name);
+    let recording = Recording::from_bytes("example.csv", example.to_string().into_bytes(), &machine)
+        .unwrap_or_else(|e| panic!("{e}\n{example}"));
+    (machine, recording)
+}
+
 #[test]
 fn examples_of_recordings_parse_and_cover_every_measurement() {
     let examples = blocks("recordings.md", "csv");
     let mut kinds: Vec<&str> = Vec::new();
     for example in &examples {
-        let name =
-            example.lines().next().and_then(|l| l.strip_prefix("# machine: ")).expect("a machine first");
-        let machine = common::machine(name);
-        let recording = Recording::from_bytes("example.csv", example.clone().into_bytes(), &machine)
-            .unwrap_or_else(|e| panic!("{e}\n{example}"));
+        let (_, recording) = recorded(example);
         let summary = recording.scan().unwrap_or_else(|e| panic!("{e}\n{example}"));
         assert!(summary.warnings.is_empty(), "{:?}\n{example}", summary.warnings);
         assert!(summary.samples >= 3);
@@ -32,6 +38,22 @@ fn examples_of_recordings_parse_and_cover_every_measurement() {
     }
     for kind in ["distance", "position", "pose", "displacement", "joint"] {
         assert!(kinds.contains(&kind), "{kind} has no example");
+    }
+}
+
+#[test]
+fn examples_of_recordings_calibrate_and_are_of_their_machine() {
+    for example in blocks("recordings.md", "csv") {
+        let (machine, recording) = recorded(&example);
+        let (_, fit) = calibrate(&machine, &[recording], Options::default())
+            .unwrap_or_else(|e| panic!("{e}: {}\n{example}", e.mend()));
+        // Readings of this machine: as declared it explains them within five of its tolerances, at a reach of a metre.
+        let tolerances = (0..machine.dyads().len()).map(|j| machine.tolerance(j));
+        let (m, rad) =
+            tolerances.fold((0.0f64, 0.0f64), |(m, rad), t| (m.max(t.translation), rad.max(t.rotation)));
+        let nominal = |rms: Option<BeforeAfter>| rms.map_or(0.0, |rms| rms.nominal);
+        let (off_m, off_rad) = (nominal(fit.rms.m), nominal(fit.rms.rad));
+        assert!(off_m < 5.0 * (m + rad) && off_rad < 5.0 * rad, "off by {off_m} m, {off_rad} rad\n{example}");
     }
 }
 

@@ -8,7 +8,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::plot::{AFTER, BACKWARD, BEFORE, CURVE, FORWARD, Layer, Marks, NEITHER, Plot, envelope, thinned};
 use super::text::{CALM, about, about_unexplained, amount, beside, figures, not_tried, probability, tests};
-use crate::cli::output::Kind;
+use crate::cli::output::{Kind, count};
 
 /// Dots and corners of all pictures together, and of one at most: the file stays below a megabyte.
 const ALL_POINTS: usize = 36_000;
@@ -78,7 +78,7 @@ pub(crate) fn page(diagnosis: &Diagnosis) -> String {
 
 fn summary(diagnosis: &Diagnosis) -> Markup {
     html! {
-        p { (diagnosis.samples) " samples in " (diagnosis.recordings.join(", ")) "." }
+        p { (count(diagnosis.samples, "sample", "samples")) " in " (diagnosis.recordings.join(", ")) "." }
         ul { @for line in figures(diagnosis) { li { (line) } } }
         @if diagnosis.findings.is_empty() && diagnosis.unexplained.is_none() { p { strong { (CALM) } } }
     }
