@@ -4,10 +4,12 @@
 mod common;
 
 mod cli;
+mod compare;
 mod compensate;
 mod diagnose;
 mod docs_effects;
 mod docs_equations;
 mod docs_recordings;
 mod outputs;
+mod program;
 mod simulate;
