@@ -1,9 +1,10 @@
 //! The command line as its users meet it: status, standard output, standard error, files.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
 use crate::common;
+use crate::program::{Folder, PROGRAM, done, err, fails, out};
 use insta::assert_snapshot;
 use kincal::CalibratedMachine;
 use kincal::lie::Vec3;
@@ -11,84 +12,12 @@ use kincal::sensor::Sensor;
 use kincal::simulate::{Instrument, random_commands, random_deviations, recording};
 use serde_json::Value;
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_kincal");
-
-/// Runs the program in the project's folder.
-fn kincal(args: &[&str]) -> Output {
-    Command::new(PROGRAM).args(args).current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("it runs")
-}
-
-fn out(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).expect("UTF-8")
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).expect("UTF-8")
-}
-
-/// Standard output of a run that must succeed without a word on standard error.
-fn done(args: &[&str]) -> String {
-    let output = kincal(args);
-    assert_eq!((output.status.code(), err(&output).as_str()), (Some(0), ""), "{args:?}");
-    out(&output)
-}
-
-/// Standard error of a run that must end with this status and an empty standard output.
-fn fails(status: i32, args: &[&str]) -> String {
-    let output = kincal(args);
-    assert_eq!(
-        (output.status.code(), out(&output).as_str()),
-        (Some(status), ""),
-        "{args:?}: {}",
-        err(&output)
-    );
-    err(&output)
-}
-
 fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|e| panic!("{e}: {text}"))
 }
 
 fn keys(value: &Value) -> Vec<&str> {
     value.as_object().expect("an object").keys().map(String::as_str).collect()
-}
-
-/// A folder of its own for each test, removed at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("kincal-cli-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Folder(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_string_lossy().into_owned()
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.0.join(name), text).expect("written");
-        self.path(name)
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.0.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).expect("a folder");
-        let mut names: Vec<String> =
-            entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 const MACHINE: &str = "machines/ac_table_tilting.ron";

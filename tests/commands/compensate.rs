@@ -1,9 +1,10 @@
 //! `kincal compensate` as a user meets it.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
 
 use crate::common;
+use crate::program::{Folder, command};
 use kincal::CalibratedMachine;
 use kincal::compensate::Setup;
 use kincal::identify::{Model, Options, calibrate_model};
@@ -15,34 +16,32 @@ use kincal::simulate::{
 use kincal::variation::{Directions, Varying};
 
 /// A folder of its own for one test, with a calibrated machine and a program in it.
-struct Bench(PathBuf);
+struct Bench(Folder);
 
 impl Bench {
     fn new(name: &str, program: &str) -> Bench {
-        let folder = std::env::temp_dir().join(format!("kincal_compensate_{name}_{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
+        let folder = Folder::new(name);
         let machine = common::machine("ac_table_tilting");
         let deviations = random_deviations(&machine, 1.0, 6);
         let calibrated = CalibratedMachine::nominal(machine).with_deviations(deviations);
-        std::fs::write(folder.join("machine.ron"), calibrated.to_ron()).expect("writable");
-        std::fs::write(folder.join("part.nc"), program).expect("writable");
+        folder.write("machine.ron", &calibrated.to_ron());
+        folder.write("part.nc", program);
         Bench(folder)
     }
 
     fn run(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
-        command.current_dir(&self.0).arg("compensate").arg("machine.ron").arg("part.nc").args(arguments);
+        let mut command = command();
+        command
+            .current_dir(self.0.path(""))
+            .arg("compensate")
+            .arg("machine.ron")
+            .arg("part.nc")
+            .args(arguments);
         command.output().expect("the program runs")
     }
 
     fn read(&self, name: &str) -> Option<String> {
-        std::fs::read_to_string(self.0.join(name)).ok()
-    }
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
+        std::fs::read_to_string(self.0.0.join(name)).ok()
     }
 }
 
@@ -78,7 +77,7 @@ fn a_refused_program_leaves_nothing_behind() {
     let said = text(&out.stderr);
     assert!(said.contains("part.nc:2:") && said.contains("  = "), "{said}");
     assert!(bench.read("out.nc").is_none());
-    let left = std::fs::read_dir(&bench.0).expect("readable").count();
+    let left = std::fs::read_dir(&bench.0.0).expect("readable").count();
     assert_eq!(left, 2);
 }
 
@@ -136,9 +135,9 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
         let at = at.map(|x| format!("{x:.3}")).join(",");
         table.push_str(&format!("{at},{a},{c}\n"));
     }
-    std::fs::write(bench.0.join("poses.csv"), table).expect("writable");
+    std::fs::write(bench.0.0.join("poses.csv"), table).expect("writable");
     let course =
-        CommandTable::open(bench.0.join("poses.csv"), &machine, 1.0).unwrap_or_else(|e| panic!("{e}"));
+        CommandTable::open(bench.0.0.join("poses.csv"), &machine, 1.0).unwrap_or_else(|e| panic!("{e}"));
     let run = Run {
         course: Box::new(course),
         instrument: Instrument::new(Sensor::Pose, 1e-7, 1e-6),
@@ -153,7 +152,7 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
     let model = Model { varying, ..Model::default() };
     let (calibrated, _) = calibrate_model(&machine, &[measured], &model, Options::default(), &|_| {})
         .unwrap_or_else(|e| panic!("{e}"));
-    std::fs::write(bench.0.join("machine.ron"), calibrated.to_ron()).expect("writable");
+    std::fs::write(bench.0.0.join("machine.ron"), calibrated.to_ron()).expect("writable");
     let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let said = text(&out.stdout);

@@ -1,49 +1,17 @@
 //! What `kincal diagnose` says to people, on the terminal and in its report.
 
-use std::path::PathBuf;
-use std::process::Command;
-
+use crate::common::random::Random;
+use crate::program::{Folder, said};
 use insta::assert_snapshot;
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 const MACHINE: &str = "machines/rotary_axis.ron";
 /// Play and noise of the simulated axis, arcsec.
 const PLAY: f64 = 12.0;
 const NOISE: f64 = 0.5;
 
-/// A folder of its own, removed at the end.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("kincal-diagnose-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Folder(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_string_lossy().into_owned()
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).expect("a folder");
-        let mut names: Vec<String> =
-            entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
 /// A reference encoder on a rotary axis that goes to and fro twice, with this much play.
 fn recording(folder: &Folder, play: f64) -> String {
-    let mut rng = StdRng::seed_from_u64(3);
+    let mut random = Random::new(3);
     let mut text = String::from(
         "# machine: rotary_axis\n# measurement: joint\n# zero: unknown\nt[s],c[deg],c_meas[deg]\n",
     );
@@ -54,24 +22,13 @@ fn recording(folder: &Folder, play: f64) -> String {
         // Where it turns it has come from the leg before.
         let direction = if (k.max(1) - 1) / count % 2 == 0 { 1.0 } else { -1.0 };
         // Twelve uniform numbers less six: nearly normal.
-        let noise: f64 = (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+        let noise: f64 = (0..12).map(|_| random.between(0.0, 1.0)).sum::<f64>() - 6.0;
         let error = 3.0 - direction * play / 2.0 + NOISE * noise;
         text += &format!("{:.2},{c},{:.7}\n", 0.1 * f64::from(k), f64::from(c) + error / 3600.0);
     }
     let path = folder.path("to_and_fro.csv");
     std::fs::write(&path, text).expect("written");
     path
-}
-
-/// Status, standard output, standard error.
-fn kincal(args: &[&str]) -> (Option<i32>, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_kincal"))
-        .args(args)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
-        .output()
-        .expect("it runs");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    (output.status.code(), text(output.stdout), text(output.stderr))
 }
 
 /// Numbers with a point to two digits, so that the last ones may differ from processor to processor.
@@ -109,7 +66,7 @@ fn assert_well_formed(page: &str) {
 fn play_of_an_axis_is_told_as_a_machinist_would() {
     let folder = Folder::new("text");
     let rec = recording(&folder, PLAY);
-    let (status, text, err) = kincal(&["diagnose", MACHINE, &rec]);
+    let (status, text, err) = said(&["diagnose", MACHINE, &rec]);
     assert_eq!((status, err.as_str()), (Some(0), ""));
     assert_snapshot!(rounded(&text));
 }
@@ -118,7 +75,7 @@ fn play_of_an_axis_is_told_as_a_machinist_would() {
 fn an_axis_without_errors_is_told_in_one_calm_sentence() {
     let folder = Folder::new("clean");
     let rec = recording(&folder, 0.0);
-    let (status, text, _) = kincal(&["diagnose", MACHINE, &rec]);
+    let (status, text, _) = said(&["diagnose", MACHINE, &rec]);
     assert_eq!(status, Some(0));
     assert!(text.ends_with("there is nothing else to be found in them.\n"), "{text}");
     assert_eq!(text.matches("\n\n").count(), 1, "{text}");
@@ -130,7 +87,7 @@ fn the_report_is_one_file_with_everything_that_was_found() {
     let rec = recording(&folder, PLAY);
     let report = folder.path("report.html");
     let json = folder.path("found.json");
-    let (status, text, err) = kincal(&["diagnose", MACHINE, &rec, "--report", &report, "--json", &json]);
+    let (status, text, err) = said(&["diagnose", MACHINE, &rec, "--report", &report, "--json", &json]);
     assert_eq!((status, err.as_str()), (Some(0), ""));
     assert!(text.ends_with(&format!("report written to {report}\n")), "{text}");
     assert_eq!(folder.names(), ["found.json", "report.html", "to_and_fro.csv"]);
@@ -162,11 +119,11 @@ fn a_report_that_cannot_be_written_is_told_before_any_work() {
     let folder = Folder::new("unwritable");
     let rec = recording(&folder, PLAY);
     let missing = folder.path("no_such_folder/report.html");
-    let (status, text, err) = kincal(&["diagnose", MACHINE, &rec, "--report", &missing]);
+    let (status, text, err) = said(&["diagnose", MACHINE, &rec, "--report", &missing]);
     assert_eq!((status, text.as_str()), (Some(1), ""));
     assert!(err.starts_with(&format!("error: {missing}: cannot be written: ")), "{err}");
     assert!(err.contains("\n  = create the folder "), "{err}");
-    let (status, ..) = kincal(&["diagnose", MACHINE, &rec, "--report", &rec]);
+    let (status, ..) = said(&["diagnose", MACHINE, &rec, "--report", &rec]);
     assert_eq!(status, Some(1), "a recording is never overwritten");
     assert_eq!(folder.names(), ["to_and_fro.csv"]);
 }

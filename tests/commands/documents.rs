@@ -1,7 +1,8 @@
 //! What documents show of the program's output is what it prints.
 
 use std::path::Path;
-use std::process::Command;
+
+use crate::program::{Folder, command, err, out};
 
 /// The lines of the README's block of this language that begins with these words.
 fn block(begins: &str) -> Vec<String> {
@@ -62,13 +63,10 @@ fn compare(shown: &[String], printed: &[&str]) -> Result<(), String> {
 
 #[test]
 fn the_demo_in_the_readme_is_what_demo_prints() {
-    let folder = std::env::temp_dir().join(format!("kincal_documents_{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let out = Command::new(env!("CARGO_BIN_EXE_kincal")).arg("demo").current_dir(&folder).output();
-    let _ = std::fs::remove_dir_all(&folder);
-    let out = out.expect("the program runs");
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    let text = String::from_utf8(out.stdout).expect("UTF-8");
+    let folder = Folder::new("documents");
+    let output = command().arg("demo").current_dir(&folder.0).output().expect("the program runs");
+    assert!(output.status.success(), "{}", err(&output));
+    let text = out(&output);
     let printed: Vec<&str> = text.lines().collect();
     let shown = block("RMS of the residuals (measured minus model)");
     assert!(shown.len() > 20, "{shown:?}");

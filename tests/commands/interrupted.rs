@@ -2,36 +2,16 @@
 #![cfg(unix)]
 
 use std::os::unix::process::ExitStatusExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A folder of its own for one test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let folder = std::env::temp_dir().join(format!("kincal_interrupted_{name}_{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        Folder(folder)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).expect("a folder");
-        entries.map(|e| e.expect("readable").file_name().to_string_lossy().into_owned()).collect()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use crate::program::{Folder, PROGRAM};
 
 /// A recording of so many rows that writing it outlasts the test.
 fn long_run(folder: &Folder) -> Child {
     let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("machines/ac_table_tilting.ron");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
+    let mut command = Command::new(PROGRAM);
     command.current_dir(&folder.0).arg("simulate").arg(machine);
     command.args(["--test", "poses", "--count", "100000000", "--noise", "1um", "-o", "rec.csv"]);
     command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program runs")
@@ -56,7 +36,7 @@ fn interrupted(folder: &Folder, signal: &str) -> Option<i32> {
 #[test]
 fn interrupting_leaves_no_part_and_no_output() {
     for (signal, number) in [("-INT", 2), ("-TERM", 15)] {
-        let folder = Folder::new(signal);
+        let folder = Folder::new("interrupted");
         assert_eq!(interrupted(&folder, signal), Some(number));
         assert_eq!(folder.names(), Vec::<String>::new(), "{signal}");
     }

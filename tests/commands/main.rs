@@ -4,10 +4,14 @@
 mod common;
 
 mod cli;
+mod compare;
 mod compensate;
 mod diagnose;
 mod docs_effects;
 mod docs_equations;
 mod docs_recordings;
+mod documents;
+mod interrupted;
 mod outputs;
+mod program;
 mod simulate;

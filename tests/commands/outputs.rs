@@ -2,31 +2,16 @@
 #![cfg(unix)]
 
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("kincal-outputs-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Folder(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
+use crate::program::{Folder, command};
 
 /// A recording of random poses, written to `output`.
 fn simulating(output: &Path) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
-    command.args(["simulate", "machines/scara.ron", "--test", "poses", "--random", "1", "-o"]).arg(output);
-    command
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
+    command()
+        .args(["simulate", "machines/scara.ron", "--test", "poses", "--random", "1", "-o"])
+        .arg(output)
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()

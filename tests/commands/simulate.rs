@@ -1,9 +1,10 @@
 //! `kincal simulate` as its users meet it, and files that it refuses.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use crate::common;
+use crate::program::{Folder, command};
 use insta::assert_snapshot;
 use kincal::lie::Vec3;
 use kincal::recording::Recording;
@@ -12,8 +13,7 @@ use kincal::{CalibratedMachine, Chain, Machine};
 use proptest::prelude::*;
 
 fn kincal(args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_kincal"));
-    command.arg("simulate").args(args).current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("it runs")
+    command().arg("simulate").args(args).output().expect("it runs")
 }
 
 /// Standard output of a run that must succeed; the folder's path is left out.
@@ -31,39 +31,6 @@ fn refused(folder: &Folder, args: &[&str]) -> String {
     assert!(output.stdout.is_empty());
     assert!(!folder.0.join("rec.csv").exists(), "{args:?} leaves a recording");
     folder.without_path(&output.stderr)
-}
-
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("kincal-simulate-{}-{name}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Folder(path)
-    }
-
-    fn path(&self, name: &str) -> String {
-        self.0.join(name).to_string_lossy().into_owned()
-    }
-
-    fn write(&self, name: &str, text: &str) -> String {
-        std::fs::write(self.0.join(name), text).expect("written");
-        self.path(name)
-    }
-
-    fn read(&self, name: &str) -> String {
-        std::fs::read_to_string(self.0.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
-    }
-
-    fn without_path(&self, bytes: &[u8]) -> String {
-        String::from_utf8_lossy(bytes).replace(&format!("{}/", self.0.display()), "")
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 #[test]

@@ -1,6 +1,9 @@
 //! What several tests need.
 #![allow(dead_code)]
 
+pub mod channels;
+pub mod random;
+
 use std::path::{Path, PathBuf};
 
 use kincal::Machine;
@@ -43,16 +46,12 @@ pub fn data(path: &str) -> PathBuf {
     full
 }
 
-/// Noise of unit variance; the sum of four even numbers is near enough to normal.
-pub fn normals(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed | 1;
-    move || {
-        let sum: f64 = (0..4)
-            .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-            })
-            .sum();
-        3f64.sqrt() * sum
-    }
+/// What was read, or nothing where it was refused; then the message says where, and there is a mend.
+pub fn read_or_refused<T>(outcome: kincal::Result<T>, file: &str) -> Option<T> {
+    outcome
+        .map_err(|error| {
+            assert!(error.to_string().starts_with(file), "{error}");
+            assert!(!error.mend().is_empty(), "{error} has no mend");
+        })
+        .ok()
 }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::common;
+use crate::common::random::Random;
 use kincal::lie::{Twist, Vec3};
 use kincal::machine::JointKind;
 use kincal::{Chain, Machine};
@@ -13,24 +14,6 @@ use serde_json::Value;
 
 /// Families in no library of ours, in the language alone.
 const FOREIGN: &str = "tests/effects/foreign.ron";
-
-/// A small generator of its own (splitmix64), so that cases are sealed.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let (a, b) = (self.unit().max(1e-300), self.unit());
-        (-2.0 * a.ln()).sqrt() * (TAU * b).cos()
-    }
-}
 
 /// What a law of this file may depend on: one instant of a recording.
 struct Instant<'a> {
@@ -57,7 +40,7 @@ const TARGET_T: Vec3<f64> = Vec3([0.11, 0.02, 0.04]);
 fn record(folder: &Path, stem: &str, law: &Law, sigma_m: f64, seed: u64) -> (PathBuf, Vec<PathBuf>) {
     let machine = common::machine(stem);
     let own = machine.commands().iter().position(|c| c == law.command).expect("a command");
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let deviations: Vec<Twist<f64>> = (0..machine.dyads().len())
         .map(|_| {
             let mut three = |by: f64| Vec3([0; 3].map(|_| by * random.normal()));
@@ -77,8 +60,9 @@ fn record(folder: &Path, stem: &str, law: &Law, sigma_m: f64, seed: u64) -> (Pat
                 let half = 0.45 * (to - from).min(widest);
                 let middle = (0.5 * (from + to)).clamp(-1e3, 1e3);
                 // Turns a second: no two joints repeat each other.
-                let rate = (2.3 + 1.7 * c as f64 + 0.9 * random.unit()) / (SAMPLES as f64 * STEP_S);
-                [middle, half, rate, TAU * random.unit(), 0.15 + 0.1 * random.unit()]
+                let rate =
+                    (2.3 + 1.7 * c as f64 + 0.9 * random.between(0.0, 1.0)) / (SAMPLES as f64 * STEP_S);
+                [middle, half, rate, TAU * random.between(0.0, 1.0), 0.15 + 0.1 * random.between(0.0, 1.0)]
             })
             .collect();
         let pose = |t: f64| -> Vec<f64> {

@@ -1,6 +1,7 @@
 //! Instruments whose noise remembers and whose readings are rounded: no structure is seen in that, and what is there is named.
 
 use crate::common;
+use crate::common::random::normals;
 use kincal::Machine;
 use kincal::diagnose::{Diagnosis, Request, diagnose};
 use kincal::effects::Library;
@@ -11,16 +12,10 @@ use proptest::test_runner::RngSeed;
 /// To and fro over 320 mm in 4000 readings: `scale` (1) of the axis, noise of 1 um that remembers `rho` of itself, rounded to `step` (mm).
 fn recording(machine: &Machine, scale: f64, rho: f64, step: f64, seed: u64) -> Recording {
     let mut text = String::from("# measurement: joint\n# zero: unknown\nt[s],x[mm],x_meas[mm]\n");
-    let mut state = seed | 1;
-    let mut even = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    let mut fresh = normals(seed);
     let mut noise = 0.0;
     for k in 0..4000 {
-        // The sum of four even numbers is near enough to normal.
-        let fresh = 3f64.sqrt() * (0..4).map(|_| even()).sum::<f64>();
-        noise = rho * noise + 0.001 * (1.0 - rho * rho).sqrt() * fresh;
+        noise = rho * noise + 0.001 * (1.0 - rho * rho).sqrt() * fresh();
         let x = if k < 2000 { 0.16 * f64::from(k) } else { 0.16 * f64::from(4000 - k) };
         let read = ((x * (1.0 + scale) + noise) / step).round() * step;
         text += &format!("{:.2},{x:.3},{read:.7}\n", 0.02 * f64::from(k));

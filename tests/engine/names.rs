@@ -1,7 +1,7 @@
 //! What names mean: with its own name left out of the library, what is concealed has none, though a wider name would take it.
 
 use crate::common;
-use crate::common::normals;
+use crate::common::random::normals;
 use kincal::diagnose::{Diagnosis, Request, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;

@@ -153,6 +153,7 @@ fn gross_outliers_are_told_and_do_not_bend_the_fit() {
         CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(&machine, 1.0, 5));
     let (instrument, header) = instrument(&machine, Sensor::Position);
     let csv = recording(&truth, &instrument, &random_commands(&machine, 300, 6), &header, 7);
+    let head = csv.lines().take_while(|line| line.starts_with('#') || line.starts_with('t')).count() as u64;
     // Every fiftieth row reads 5 mm too much in x.
     let mut rows = 0;
     let spoilt: Vec<String> = csv
@@ -178,7 +179,7 @@ fn gross_outliers_are_told_and_do_not_bend_the_fit() {
         assert_eq!(fit.down_weighted, 6, "{loss:?}");
         assert_eq!(fit.suspects.len(), 6);
         assert!(fit.suspects.iter().all(|s| s.residual > 4e-3 && s.weight < 0.5));
-        assert!(fit.suspects.iter().all(|s| (s.line - 5) % 50 == 0 || s.line > 0));
+        assert!(fit.suspects.iter().all(|s| (s.line - head) % 50 == 0), "{:?}", fit.suspects);
         let (worst, _) = worst(&truth, &fit);
         assert!(worst < 6.0, "{loss:?}: off by {worst:.2} standard errors");
     }

@@ -1,7 +1,5 @@
 //! Rivals: schemes that must agree where they say the same, a filter that must end where least squares ends, and the harness.
 
-use std::process::Command;
-
 use crate::common;
 use kincal::identify::{Loss, Options, Solver, calibrate};
 use kincal::lie::{Twist, Vec3};
@@ -386,65 +384,4 @@ fn every_named_rival_gives_a_verdict_on_the_same_data() {
             assert!(mean < 0.5 * declared, "{name}: {mean:.2e} against {declared:.2e} as declared");
         }
     }
-}
-
-/// Status, standard output and standard error of the program.
-fn kincal(args: &[&str]) -> (i32, String, String) {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_kincal"));
-    let output = program.args(args).current_dir(env!("CARGO_MANIFEST_DIR")).output().expect("it runs");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
-    (output.status.code().expect("a status"), text(output.stdout), text(output.stderr))
-}
-
-#[test]
-fn the_command_prints_a_table_and_says_what_is_wrong_with_its_input() {
-    let machine = common::machine("ac_table_tilting");
-    let folder = std::env::temp_dir().join(format!("kincal-compare-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).expect("a folder");
-    let write = |name: &str, text: String| {
-        std::fs::write(folder.join(name), text).expect("written");
-        folder.join(name).to_string_lossy().into_owned()
-    };
-    let head = ["sigma[um]: 1".to_string()];
-    let truth =
-        CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(&machine, 1.0, 1));
-    let instrument = Instrument::new(Sensor::Position, 1e-6, 0.0);
-    let csv = recording(&truth, &instrument, &random_commands(&machine, 200, 2), &head, 3);
-    let (rec, true_ron) = (write("rec.csv", csv), write("true.ron", truth.to_ron()));
-    let ron = "machines/ac_table_tilting.ron";
-
-    let (status, out, err) = kincal(&["compare", ron, &rec, "--truth", &true_ron, "--samples", "50"]);
-    assert_eq!((status, err.as_str()), (0, ""));
-    for (name, _) in Rival::named(Tuning::default()) {
-        assert!(out.lines().any(|line| line.trim().starts_with(name)), "{name} in\n{out}");
-    }
-    assert!(out.contains("fitted to 50 samples, judged by the other samples"), "{out}");
-    assert!(out.contains("local-gauss-newton failed: "), "{out}");
-
-    let (status, out, _) =
-        kincal(&["compare", ron, &rec, "--truth", &true_ron, "--rivals", "kalman,local", "--json", "-"]);
-    let json: serde_json::Value = serde_json::from_str(&out).expect("JSON alone");
-    assert_eq!((status, json["judged_by"].as_str()), (0, Some("the same samples")));
-    let rivals = json["rivals"].as_array().expect("a list");
-    assert_eq!(
-        rivals.iter().map(|r| r["rival"].as_str().expect("a name")).collect::<Vec<_>>(),
-        ["kalman", "local"]
-    );
-    let dp = |i: usize| rivals[i]["truth"]["dp_m"].as_f64().expect("a length");
-    assert!(dp(0) < 2e-6 && (dp(0) / dp(1) - 1.0).abs() < 1e-2, "{} {}", dp(0), dp(1));
-
-    for (args, status, words) in [
-        (vec!["--rivals", "nobody"], 1, "choose from: declared, local"),
-        (vec!["--truth", "machines/scara.ron"], 1, "its frames and joints are not those of"),
-        (vec!["--samples", "1"], 2, "--samples"),
-        (vec!["--tau", "-1"], 2, "above zero"),
-        (vec!["--judge", "nowhere.csv"], 1, "nothing is there"),
-        (vec!["--json", rec.as_str()], 1, "the output is one of the recordings"),
-    ] {
-        let all: Vec<&str> = ["compare", ron, &rec].into_iter().chain(args.iter().copied()).collect();
-        let (got, out, err) = kincal(&all);
-        assert_eq!((got, out.as_str()), (status, ""), "{args:?}: {err}");
-        assert!(err.contains(words), "{args:?}: {err}");
-    }
-    std::fs::remove_dir_all(&folder).expect("removed");
 }

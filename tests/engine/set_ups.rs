@@ -1,6 +1,7 @@
 //! What belongs to a set-up, and what happens within one: zeros that differ, ground that gives way, a slip that no clock dates.
 
 use crate::common;
+use crate::common::random::Random;
 use kincal::diagnose::{Companion, Diagnosis, Request, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
 use kincal::identify::{Loss, Options, fit_setup};
@@ -8,26 +9,12 @@ use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::{CalibratedMachine, Machine};
 
-/// Even numbers from -1 to 1; the sum of four is near enough to normal.
-struct Random(u64);
-
-impl Random {
-    fn even(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * ((self.0 >> 11) as f64 / (1u64 << 53) as f64) - 1.0
-    }
-
-    fn normal(&mut self) -> f64 {
-        (0..4).map(|_| self.even()).sum::<f64>() * 0.75f64.sqrt()
-    }
-}
-
 /// Poses over half of every joint's travel, and the head of a recording for them.
 fn poses(machine: &Machine, count: usize, random: &mut Random) -> Vec<Vec<f64>> {
     let one = |random: &mut Random, c: usize| {
         let (from, to) = machine.travel(c);
         let (from, to) = (from.max(-1.5), to.min(if from > -0.1 { 4.0 } else { 1.5 }));
-        0.5 * (from + to) + 0.45 * (to - from) * random.even()
+        0.5 * (from + to) + 0.45 * (to - from) * random.between(-1.0, 1.0)
     };
     (0..count).map(|_| (0..machine.commands().len()).map(|c| one(random, c)).collect()).collect()
 }
@@ -93,7 +80,7 @@ fn names(said: &Diagnosis) -> Vec<(&str, &str)> {
 fn a_slip_without_a_clock_is_dated_by_the_order_of_samples() {
     let machine = common::machine("six_r_arm");
     let nominal = CalibratedMachine::nominal(machine.clone());
-    let mut random = Random(7);
+    let mut random = Random::new(7);
     let all: Vec<_> = ["a.csv", "b.csv"]
         .into_iter()
         .enumerate()
@@ -143,7 +130,7 @@ fn referenced_anew(machine: &Machine, zeros: &[[f64; 6]], random: &mut Random) -
 #[test]
 fn zeros_of_one_axis_that_come_anew_bring_those_of_the_others_into_the_model() {
     let machine = common::machine("six_r_arm");
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let zeros = [3e-4, -2e-4, -1e-4, 2.5e-4].map(|large| {
         // The third joint's are a twentieth of the second's: too little for a name.
         [0.0, large, 0.05 * 3e-4 * random.normal().signum(), 0.0, 0.0, 0.0]
@@ -171,7 +158,7 @@ fn zeros_of_one_axis_that_come_anew_bring_those_of_the_others_into_the_model() {
 fn among_set_ups_without_a_clock_no_frame_stays_slipped_from_one_to_the_next() {
     let machine = common::machine("six_r_arm");
     let slips = |setups: [&str; 2]| {
-        let mut random = Random(5);
+        let mut random = Random::new(5);
         let one = |(name, setup)| {
             let poses = poses(&machine, 20, &mut random);
             let still = vec![[0.0; 3]; poses.len()];
@@ -192,7 +179,7 @@ fn among_set_ups_without_a_clock_no_frame_stays_slipped_from_one_to_the_next() {
 fn ground_that_gives_way_belongs_to_its_set_up_and_is_found_again_in_a_new_one() {
     let machine = common::machine("hilti_jaibot");
     let library = Library::standard();
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let places = ["stone", "wood", "mud"];
     let files = places.map(|place| format!("{place}.csv"));
     let poses = places.map(|_| poses(&machine, 150, &mut random));
@@ -256,7 +243,7 @@ fn ground_that_gives_way_belongs_to_its_set_up_and_is_found_again_in_a_new_one()
 fn what_is_right_holds_in_a_set_up_left_out_and_a_meaningless_cause_does_not() {
     let machine = common::machine("six_r_arm");
     let nominal = CalibratedMachine::nominal(machine.clone());
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let all = ["left", "right"].map(|place| {
         let poses = poses(&machine, 90, &mut random);
         let mut real = poses.clone();
@@ -283,9 +270,9 @@ fn any_other_function_of_where_a_joint_stands_is_unexplained_at_that_joint() {
     let machine = common::machine("six_r_arm");
     let nominal = CalibratedMachine::nominal(machine.clone());
     for seed in [3, 4, 5] {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let poses = poses(&machine, 300, &mut random);
-        let heights: Vec<f64> = (0..21).map(|_| 2e-4 * random.even().signum()).collect();
+        let heights: Vec<f64> = (0..21).map(|_| 2e-4 * random.between(-1.0, 1.0).signum()).collect();
         let told = |bumps: f64, random: &mut Random| {
             let mut off = poses.clone();
             for pose in &mut off {

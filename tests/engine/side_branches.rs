@@ -1,6 +1,7 @@
 //! What hangs on a machine beside the chain that is measured: it weighs, its joints are columns, and it is left out where they are not.
 
 use crate::common;
+use crate::common::random::Random;
 use kincal::CalibratedMachine;
 use kincal::Machine;
 use kincal::diagnose::{Diagnosis, Request, diagnose};
@@ -8,8 +9,6 @@ use kincal::effects::{Identified, Library, RecordingFacts};
 use kincal::feature::{Binding, Expression, Feature, as_seen_in, samples_of};
 use kincal::predict::predict;
 use kincal::recording::{Recording, RecordingFault};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 /// A post that leans about x, with an arm on either side; the right one is measured.
 const POST: &str = r#"Machine(
@@ -33,8 +32,8 @@ fn post() -> Machine {
 
 /// Uniform numbers of a fixed seed.
 fn numbers(seed: u64) -> impl FnMut(f64, f64) -> f64 {
-    let mut random = StdRng::seed_from_u64(seed);
-    move |from, to| random.random_range(from..to)
+    let mut random = Random::new(seed);
+    move |from, to| random.between(from, to)
 }
 
 fn recording(machine: &Machine, columns: &str, rows: &[Vec<f64>]) -> Recording {

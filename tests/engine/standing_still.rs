@@ -1,6 +1,7 @@
 //! A joint that stands still all through a recording: nothing but the readings says from which side it came there.
 
 use crate::common;
+use crate::common::random::normals;
 use kincal::CalibratedMachine;
 use kincal::diagnose::{Request, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
@@ -44,17 +45,10 @@ fn read(truth: &CalibratedMachine, at: &Recording, seed: u64) -> Vec<[f64; 3]> {
     let head: Vec<&str> = rows.next().expect("a head").split(',').collect();
     let at = ["px_model[m]", "py_model[m]", "pz_model[m]"]
         .map(|name| head.iter().position(|cell| *cell == name).expect("a column"));
-    let mut state = seed;
-    let mut even = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        2.0 * ((state >> 11) as f64 / (1u64 << 53) as f64) - 1.0
-    };
+    let mut noise = normals(seed);
     let noisy = |row: &str| {
         let cells: Vec<&str> = row.split(',').collect();
-        at.map(|i| {
-            let noise: f64 = (0..4).map(|_| even()).sum::<f64>() * 0.75f64.sqrt();
-            cells[i].parse::<f64>().expect("a number") + 1e-6 * noise
-        })
+        at.map(|i| cells[i].parse::<f64>().expect("a number") + 1e-6 * noise())
     };
     rows.map(noisy).collect()
 }

@@ -4,13 +4,12 @@
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::fmt::Write;
 
+use crate::common::random::Random;
 use kincal::lie::{Pose, Twist, Vec3, Wrench};
 use kincal::motion::Play;
 use kincal::recording::Recording;
 use kincal::{Chain, Machine};
 use nalgebra::{DMatrix, DVector};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 /// Standard deviation of the ballbar's readings, m.
 pub const SIGMA: f64 = 1e-6;
@@ -43,12 +42,6 @@ impl Axes {
     }
 }
 
-/// A normal number.
-pub fn normal(rng: &mut StdRng) -> f64 {
-    let (u, v) = (rng.random_range(f64::MIN_POSITIVE..1.0), rng.random_range(0.0..TAU));
-    (-2.0f64 * f64::ln(u)).sqrt() * f64::cos(v)
-}
-
 /// The numbers that make a table: location errors of every dyad, play of A and C (over [`PLAY`]), its weight, and error motions,
 /// each but the play over its standard deviation.
 #[derive(Clone)]
@@ -73,9 +66,9 @@ impl Table {
     }
 
     pub fn random(machine: &Machine, seed: u64) -> Self {
-        let mut rng = StdRng::seed_from_u64(seed);
+        let mut random = Random::new(seed);
         let (mean, deviation) = Self::prior(machine);
-        Table { numbers: mean.iter().zip(&deviation).map(|(m, s)| m + s * normal(&mut rng)).collect() }
+        Table { numbers: mean.iter().zip(&deviation).map(|(m, s)| m + s * random.normal()).collect() }
     }
 
     /// The deviations at the commands `q`; `behind`: what play leaves of the drives' positions of A and C, rad.
@@ -195,7 +188,7 @@ pub fn path(
 
 /// A recording of the bar with noise.
 pub fn record(machine: &Machine, table: &Table, path: &[Vec<f64>], name: &str, seed: u64) -> Recording {
-    let mut rng = StdRng::seed_from_u64(seed);
+    let mut random = Random::new(seed);
     let mut text = String::from("# measurement: distance\n");
     let unit = |c: usize| {
         if machine.command_joint(c).kind == kincal::machine::JointKind::Prismatic { "m" } else { "rad" }
@@ -205,7 +198,7 @@ pub fn record(machine: &Machine, table: &Table, path: &[Vec<f64>], name: &str, s
     let _ = writeln!(text, "{},r[m]", names.join(","));
     for (q, length) in path.iter().zip(table.lengths(machine, path)) {
         let cells: Vec<String> = q.iter().map(|x| format!("{x:.12}")).collect();
-        let _ = writeln!(text, "{},{:.12}", cells.join(","), length + SIGMA * normal(&mut rng));
+        let _ = writeln!(text, "{},{:.12}", cells.join(","), length + SIGMA * random.normal());
     }
     Recording::from_bytes(name, text.as_bytes(), machine).unwrap_or_else(|e| panic!("{e}"))
 }

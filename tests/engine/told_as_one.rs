@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::common;
-use crate::common::normals;
+use crate::common::random::normals;
 use kincal::diagnose::{Diagnosis, Request, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;

@@ -1,7 +1,6 @@
 //! Laws of compensation: what stays byte for byte, what an arc may leave, what adds up, and what real readers say.
 
 use std::path::Path;
-use std::process::Command;
 
 use crate::common;
 use kincal::compensate::{Model, Options, Report, Setup, compensate_text, compensate_with};
@@ -12,6 +11,10 @@ use kincal::{CalibratedMachine, Chain, Machine};
 use proptest::prelude::*;
 
 use crate::common::machine;
+
+mod any;
+mod linuxcnc;
+mod pieces;
 
 /// A shipped machine with random deviations, `size` times its tolerances.
 fn erroneous(stem: &str, size: f64) -> CalibratedMachine {
@@ -328,72 +331,6 @@ fn other_controls_are_written_in_their_own_way() {
     assert!(out.contains("X=IC(29.") && out.contains("A=AC(") && out.contains("C=DC("), "{out}");
 }
 
-/// Deviations for a growing first joint and others for a shrinking one.
-#[derive(Clone)]
-struct TwoPieces {
-    chains: [Chain<f64>; 2],
-    last: Option<f64>,
-    direction: i8,
-}
-
-impl Model for TwoPieces {
-    fn advance(&mut self, commands: &[f64], ways: &[bool]) {
-        if let Some(last) = self.last.filter(|_| ways[0])
-            && (commands[0] - last).abs() > 1e-9
-        {
-            self.direction = if commands[0] < last { -1 } else { 1 };
-        }
-        self.last = Some(commands[0]);
-    }
-    fn chain(&self) -> &Chain<f64> {
-        &self.chains[self.piece()]
-    }
-    fn piece(&self) -> usize {
-        usize::from(self.direction < 0)
-    }
-    fn is_nominal(&self) -> bool {
-        false
-    }
-    fn extrapolates(&self, _: &[f64]) -> bool {
-        false
-    }
-    fn restart(&mut self, first: &[i8]) {
-        (self.last, self.direction) = (None, first[0]);
-    }
-    fn ahead(&self) -> Box<dyn Model + '_> {
-        Box::new(self.clone())
-    }
-    fn keyed(&self) -> &[usize] {
-        &[0]
-    }
-    fn directions(&self) -> Vec<i8> {
-        vec![self.direction; 3]
-    }
-}
-
-#[test]
-fn the_step_at_a_reversal_is_told_with_its_line() {
-    let (machine, mut model, address) = with_play();
-    let text = "G90 G0 X0 Y0 Z0\nG1 @10 F99\n@20\nG4 P1\nZ1\n@15\n@10\n@12\n".replace('@', &address);
-    let (out, report) = compensate_with(
-        &machine,
-        &mut model,
-        "part.nc",
-        text.as_bytes(),
-        &Setup::default(),
-        &Options::default(),
-    )
-    .unwrap_or_else(|e| panic!("{e}"));
-    let lines: Vec<usize> = report.reversals.first.iter().map(|r| r.line).collect();
-    assert_eq!(lines, [6, 8]);
-    assert!(report.reversals.first.iter().all(|r| (r.step_m - 12e-6).abs() < 1e-9), "{report:?}");
-    assert!((report.largest_reversal_m.value - 12e-6).abs() < 1e-9);
-    let out = String::from_utf8_lossy(&out).into_owned();
-    let expected = "G90 G0 X0 Y0 Z0\nG1 @10.006 F99\n@20.006\nG4 P1\nZ1\n@14.994\n@9.994\n@12.006\n";
-    let plain = out.replace("X0.006", "X0").replace("Y0.006", "Y0");
-    assert_eq!(plain, expected.replace('@', &address));
-}
-
 #[test]
 fn out_of_travel_and_singular_blocks_are_told_by_line() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
@@ -503,182 +440,6 @@ mod data_sets {
     }
 }
 
-mod linuxcnc {
-    use super::*;
-
-    /// Moves in what LinuxCNC's interpreter says.
-    fn canonical_moves(text: &str) -> (usize, usize) {
-        static NUMBER: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
-        let number = NUMBER.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        let folder = std::env::temp_dir().join(format!("kincal_rs274_{}_{number}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder for a moment");
-        let (program, tools) = (folder.join("part.ngc"), folder.join("tool.tbl"));
-        std::fs::write(&program, text).expect("writable");
-        std::fs::write(&tools, "T1 P1 Z40 D6\n").expect("writable");
-        let out =
-            Command::new("rs274").arg("-g").arg("-t").arg(&tools).arg(&program).current_dir(&folder).output();
-        let _ = std::fs::remove_dir_all(&folder);
-        let out = out.unwrap_or_else(|e| panic!("rs274, the interpreter of LinuxCNC, does not start: {e}"));
-        let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
-        assert!(out.status.success() && text.contains("PROGRAM_END"), "{text}");
-        let count = |what: &str| text.matches(what).count();
-        (count("STRAIGHT_TRAVERSE(") + count("STRAIGHT_FEED("), count("ARC_FEED("))
-    }
-
-    #[test]
-    #[ignore = "needs rs274, the interpreter of LinuxCNC"]
-    fn what_is_written_is_read_with_the_same_moves() {
-        let calibrated = erroneous("ac_table_tilting", 1.0);
-        let mut text =
-            String::from("%\n(five axes)\nG21 G90 G94 G17 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z10 A20 C0\n");
-        for k in 0..400 {
-            let s = f64::from(k) * 0.05;
-            text.push_str(&match k % 5 {
-                0 => format!("N{k} G1 X{:.3} Y{:.3} F500\n", 40.0 * s.sin(), 30.0 * s.cos()),
-                1 => format!("Z{:.2}(depth)\n", 5.0 * (0.3 * s).sin()),
-                2 => format!("A{:.4} C{:.4}\n", 20.0 + 30.0 * s.sin(), 20.0 * s),
-                3 => "G91 X-.25 C1.5\n".to_string(),
-                _ => "G90 G0 Z12.\n".to_string(),
-            });
-        }
-        text.push_str("G93\nG1 X3 A10 F30\nG94\nM2\n%\n");
-        let setup = r#"Setup(tools: {"1": 40}, work_offsets: {"G54": {"Z": -40}})"#;
-        let (out, _) = with_setup(&calibrated, &text, setup, &Options::default());
-        let before = canonical_moves(&text);
-        assert_eq!(canonical_moves(&out), before);
-        assert!(before.0 > 390);
-        // With arcs there are as many lines as the report says.
-        let arcs = "%\nG21 G90 G17 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z10 A20 C0\nG2 X20 Y0 I10 J0 F300\nG3 X20 Y0 Z8 I-10 J5 P2\nG18 G2 X30 Z8 R8\nG19 G3 Y8 Z16 K8 J0\nG1 X1\nM2\n%\n";
-        let options = Options { arcs: Some(5e-6), ..Options::default() };
-        let (out, report) = with_setup(&calibrated, arcs, setup, &options);
-        assert_eq!(report.split_arcs, 4);
-        assert_eq!(canonical_moves(arcs), (2, 4));
-        assert_eq!(canonical_moves(&out), (2 + report.arc_lines as usize, 0));
-        // Sub-programs.
-        let sub = "o100 sub\nG1 X10. Y5. Z-2. F200\nX40.\nG0 Z20.\no100 endsub\nG21 G90 G54\nT1 M6\nG43 H1\nG0 X0. Y0. Z20. A20. C30.\no100 call\nM2\n";
-        let (out, _) = with_setup(&calibrated, sub, setup, &Options::default());
-        assert_eq!(canonical_moves(&out), canonical_moves(sub));
-    }
-}
-
-/// The same cases on every run.
-fn fixed_cases() -> ProptestConfig {
-    ProptestConfig {
-        cases: 192,
-        rng_seed: proptest::test_runner::RngSeed::Fixed(20_260_203),
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    }
-}
-
-/// A block of axis words and whatever else a program has.
-fn block() -> impl Strategy<Value = String> {
-    let number = (-9_000i32..9_000, 0usize..5).prop_map(|(n, d)| format!("{:.*}", d, f64::from(n) / 97.0));
-    let word =
-        (prop::sample::select(vec!["X", "Y", "Z", "A", "C"]), number, prop::sample::select(vec!["", " "]));
-    let words = prop::collection::vec(word, 0..5).prop_map(|words| {
-        let mut seen = Vec::new();
-        let mut text = String::new();
-        for (address, number, blank) in words {
-            if !seen.contains(&address) {
-                seen.push(address);
-                text.push_str(&format!("{address}{blank}{number} "));
-            }
-        }
-        text
-    });
-    let head = prop::sample::select(vec![
-        "",
-        "G1 ",
-        "G0 ",
-        "G90 ",
-        "N20 G1",
-        "N7 ",
-        "G21",
-        "G91 G1 ",
-        "G94 ",
-        "n30  g01 ",
-    ]);
-    let tail = prop::sample::select(vec!["", "F200", "(X1 (in) Y2)", ";C3", "M8", " S500 M3 (on)", "  \t"]);
-    let ending = prop::sample::select(vec!["\n", "\r\n"]);
-    (head, words, tail, ending).prop_map(|(h, w, t, e)| format!("{h}{w}{t}{e}"))
-}
-
-/// A text without its axis words and the blanks before them.
-fn without_axis_words(text: &str) -> Vec<u8> {
-    let mut program = Program::new("part.nc", text.as_bytes()).expect("readable");
-    let mut rest = Vec::new();
-    while let Some(block) = program.next_block().expect("readable") {
-        let bytes = block.bytes();
-        let mut at = 0;
-        for word in block.words().iter().filter(|w| AXES.contains(&w.address.as_str())) {
-            rest.extend(bytes[at..word.span.start].iter().filter(|b| **b != b' '));
-            at = word.span.end;
-        }
-        rest.extend(bytes[at..].iter().filter(|b| **b != b' '));
-    }
-    rest
-}
-
-proptest! {
-    #![proptest_config(fixed_cases())]
-
-    #[test]
-    fn a_nominal_machine_gives_every_byte_back(blocks in prop::collection::vec("\\PC{0,30}\n?", 0..20)) {
-        let nominal = CalibratedMachine::nominal(machine("ac_table_tilting"));
-        let text = blocks.concat();
-        let (out, _) = run(&nominal, &text, &Options::default());
-        prop_assert_eq!(out, text);
-    }
-
-    #[test]
-    fn nothing_but_axis_words_changes(blocks in prop::collection::vec(block(), 1..40)) {
-        let calibrated = erroneous("ac_table_tilting", 1.0);
-        let text = format!("G90 G0 X0 Y0 Z0 A30 C0\n{}", blocks.concat());
-        let (out, report) = run(&calibrated, &text, &Options::default());
-        prop_assert_eq!(without_axis_words(&out), without_axis_words(&text));
-        prop_assert_eq!(report.blocks as usize, text.lines().count());
-    }
-
-    #[test]
-    fn every_end_of_a_move_is_where_the_program_means_it(blocks in prop::collection::vec(block(), 1..30)) {
-        let calibrated = erroneous("ac_table_tilting", 1.0);
-        let text = format!("G90 G0 X0 Y0 Z0 A30 C0\n{}", blocks.concat());
-        let (out, report) = run(&calibrated, &text, &Options::default());
-        let (machine, actual) = (calibrated.machine(), calibrated.chain());
-        let (meant, sent) = (targets(&text, &AXES), targets(&out, &AXES));
-        prop_assert_eq!(meant.len(), sent.len());
-        for (meant, sent) in meant.iter().zip(&sent) {
-            prop_assert!(report.out_of_travel.count > 0 || tip_error(&actual, machine, meant, sent) < 1.1e-6, "{}\n{}", text, out);
-        }
-    }
-
-    #[test]
-    fn any_text_is_corrected_or_refused(blocks in prop::collection::vec("\\PC{0,20}", 0..12)) {
-        let calibrated = erroneous("bc_table_tilting", 1.0);
-        let setup = Setup::default();
-        let options = Options { arcs: Some(0.05), split: Some(0.05), ..Options::default() };
-        if let Err(error) = compensate_text(&calibrated, "any.nc", blocks.join("\n"), &setup, &options) {
-            prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
-        }
-    }
-
-    #[test]
-    fn any_words_are_corrected_or_refused(tokens in prop::collection::vec(prop::sample::select(vec![
-        "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G28", "G43", "G43.4", "G49", "G52", "G53", "G54", "G68", "G69",
-        "G80", "G81", "G90", "G91", "G92", "G93", "X1", "Y-2.5", "Z.3", "A10", "C=20", "X[1+2]", "I3", "J-1", "K2", "R4", "P2", "F9",
-        "H1", "T1", "M6", "M98", "M99", "M30", "O100", "o100 sub\n", "o100 endsub\n", "\n", "\n", "\n", "TRAORI", "TRANS", "AROT", "SUPA", "(c)", ";e\n", "/", "%",
-        "MCALL CYCLE81(1,2)", "L X+1", "FMAX", "1e999", "X99999999999999999999", "D0", "IX3",
-    ]), 0..60)) {
-        let calibrated = erroneous("bc_table_tilting", 1.0);
-        let setup = Setup::parse("s.ron", r#"Setup(tools: {"1": 50}, work_offsets: {"G54": {"X": 3}})"#).expect("a set-up");
-        let options = Options { arcs: Some(0.05), split: Some(0.05), ..Options::default() };
-        if let Err(error) = compensate_text(&calibrated, "any.nc", tokens.join(" "), &setup, &options) {
-            prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
-        }
-    }
-}
-
 #[test]
 fn an_arc_names_the_axes_that_it_needs_or_is_refused() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
@@ -704,60 +465,5 @@ fn an_arc_names_the_axes_that_it_needs_or_is_refused() {
         let mut sent = targets(&out, &AXES);
         let end = sent.pop().expect("a move");
         assert!(tip_error(&actual, machine, &[0.0, 30.0, 5.0, 40.0, 10.0], &end) < 2e-6, "{end:?}");
-    }
-}
-
-/// Play of 12 um on the first joint of `xyz_mill`; its address.
-fn with_play() -> (Machine, TwoPieces, String) {
-    let machine = machine("xyz_mill");
-    let (dyad, along) = machine.joints().next().map(|(j, joint)| (j, joint.axis)).expect("a joint");
-    let chain = |by: f64| {
-        let mut deviations = vec![Twist::zero(0.0); machine.dyads().len()];
-        deviations[dyad].v = along.times(by);
-        CalibratedMachine::nominal(machine.clone()).with_deviations(deviations).chain()
-    };
-    let model = TwoPieces { chains: [chain(-6e-6), chain(6e-6)], last: None, direction: 0 };
-    let address = machine.command_joint(0).nc_word().address;
-    (machine, model, address)
-}
-
-#[test]
-fn the_first_direction_of_an_axis_follows_from_where_it_starts_or_from_its_first_known_way() {
-    let options = Options { arcs: Some(1e-3), ..Options::default() };
-    // By set-up and program (@: the axis): thousandths that are added to its words in turn, and lines with an unknown way.
-    let cases: [(&str, &str, &[i64], &[usize]); 9] = [
-        // Forward from the start, and from the other side.
-        ("start: {\"@\": 0}", "G0 @10\nG1 @20 F9\n", &[6, 6], &[]),
-        ("start: {\"@\": 50}", "G0 @10\nG4 P1\n", &[-6], &[]),
-        ("start: {\"@\": 10}", "G0 @10\nG1 @20 F9\n", &[6, 6], &[]),
-        // From nowhere: the first way between two known places holds before it.
-        ("", "G0 @10\nG1 @10 F9\n@4\n@20\n", &[-6, -6, -6, 6], &[1]),
-        ("", "G0 @10\nG4 P1\nG91 G1 @-2 F9\n", &[-6, 0], &[1]),
-        // From a place of the machine.
-        ("", "G53 G0 @30\nG0 @10\n", &[0, -6], &[]),
-        // From a reference point that the set-up knows, or does not.
-        ("reference: {\"@\": -50}", "G28 @0\nG0 @10\n", &[0, 6], &[]),
-        ("reference: {\"@\": 50}", "G0 @0\nG1 @1 F9\nG28 @0\nG0 @10\n", &[6, 6, 0, -6], &[1]),
-        ("", "G0 @0\nG1 @-1 F9\nG28 @0\nG0 @10\n", &[-6, -6, 0, -6], &[1, 4]),
-    ];
-    for (setup, program, added, unknown) in cases {
-        let (machine, mut model, address) = with_play();
-        let named = |text: &str| text.replace('@', &address);
-        let setup = Setup::parse("setup.ron", &named(&format!("Setup({setup})"))).expect("readable");
-        let text = named(program);
-        let (out, report) =
-            compensate_with(&machine, &mut model, "part.nc", text.as_bytes(), &setup, &options)
-                .unwrap_or_else(|e| panic!("{text}: {e}"));
-        let out = String::from_utf8_lossy(&out).into_owned();
-        let words = |text: &str| -> Vec<f64> {
-            let words = text.split_whitespace().filter_map(|w| w.strip_prefix(address.as_str()));
-            words.map(|w| w.parse().expect("a number")).collect()
-        };
-        let by: Vec<i64> = (words(&out).iter().zip(words(&text)))
-            .map(|(after, before)| ((after - before) * 1e3).round() as i64)
-            .collect();
-        assert_eq!(by, added, "{text}{out}");
-        let lines: Vec<usize> = report.unknown_ways.first.iter().map(|way| way.line).collect();
-        assert_eq!(lines, unknown, "{text}");
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::common::read_or_refused;
 use kincal::recording::{Chunk, Measurement, NominalLength, Recording, RecordingFault, Role, ToolPoint};
 use kincal::units::Quantity;
 use kincal::{Error, Machine};
@@ -315,12 +316,15 @@ fn fixed_cases() -> ProptestConfig {
 
 /// Reads in every way there is.
 fn read(bytes: &[u8], machine: &Machine) {
-    let Ok(recording) = Recording::from_bytes("any.csv", bytes, machine) else { return };
-    let _ = recording.scan();
-    let _ = all(&recording);
+    let refused = Recording::from_bytes("any.csv", bytes, machine);
+    let Some(recording) = read_or_refused(refused, "any.csv") else { return };
+    let scanned = read_or_refused(recording.scan(), "any.csv");
+    read_or_refused(all(&recording), "any.csv");
     let rows = recording.rows_with_text().expect("memory");
-    for block in rows.map_while(Result::ok) {
-        let _ = block.rows().count();
+    let blocks = rows.map_while(|block| read_or_refused(block, "any.csv"));
+    let counted: usize = blocks.map(|block| block.rows().count()).sum();
+    if let Some(summary) = scanned {
+        assert_eq!((summary.rows, summary.samples + summary.dropped), (counted as u64, counted as u64));
     }
 }
 

@@ -1,11 +1,10 @@
 //! Which columns go with which update (facts.md, section 1).
 
+use crate::common::random::Random;
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::simulate::random_commands;
 use kincal::{CalibratedMachine, Chain, Machine};
 use nalgebra::{DMatrix, DVector};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 use super::reference::*;
 
@@ -96,11 +95,11 @@ fn updated(
 #[test]
 fn columns_are_the_derivatives_of_their_own_update() {
     let machine = machine();
-    let mut rng = StdRng::seed_from_u64(3);
+    let mut random = Random::new(3);
     let links: Vec<Pose<f64>> = (machine.dyads().iter())
         .map(|d| {
             d.placement.pose()
-                * Pose::exp(Twist::from_array(std::array::from_fn(|_| rng.random_range(-0.3..0.3))))
+                * Pose::exp(Twist::from_array(std::array::from_fn(|_| random.between(-0.3, 0.3))))
         })
         .collect();
     let qs = random_commands(&machine, 6, 4);
@@ -127,8 +126,8 @@ fn columns_are_the_derivatives_of_their_own_update() {
 /// Largest position error after each step of plain minimum-norm least squares on exact positions.
 fn convergence(columns: Columns, update: Update) -> Vec<f64> {
     let machine = machine();
-    let mut rng = StdRng::seed_from_u64(7);
-    let mut some = |size: f64| size * rng.random_range(-1.0..1.0);
+    let mut random = Random::new(7);
+    let mut some = |size: f64| size * random.between(-1.0, 1.0);
     let deviations: Vec<Twist<f64>> = (machine.dyads().iter())
         .map(|_| Twist::from_array(std::array::from_fn(|k| some(if k < 3 { 1e-4 } else { 2e-4 }))))
         .collect();

@@ -3,13 +3,12 @@
 
 use std::f64::consts::TAU;
 
+use crate::common::random::Random;
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::recording::Recording;
 use kincal::rivals::{Form, Rival, Scheme, Step, against_truth};
 use kincal::{CalibratedMachine, Chain, Machine};
 use nalgebra::DMatrix;
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 /// Seeds of the noise; every figure is a median over them.
 pub const SEEDS: u64 = 20;
@@ -141,7 +140,7 @@ pub enum Kind {
 /// A recording of a machine with noise uniform in `[0, noise]` m.
 pub fn record(machine: &CalibratedMachine, qs: &[Vec<f64>], kind: Kind, noise: f64, seed: u64) -> Recording {
     let (chain, declared) = (machine.chain(), machine.machine());
-    let mut rng = StdRng::seed_from_u64(seed);
+    let mut random = Random::new(seed);
     let unit = |joint: &str| if ["a", "c"].contains(&joint) { "rad" } else { "m" };
     let names: Vec<String> = declared.commands().iter().map(|c| format!("{c}[{}]", unit(c))).collect();
     let (word, columns) = match kind {
@@ -152,8 +151,7 @@ pub fn record(machine: &CalibratedMachine, qs: &[Vec<f64>], kind: Kind, noise: f
     for q in qs {
         let p = chain.w_from_t(q).translation;
         let values = if kind == Kind::Position { p.0.to_vec() } else { vec![p.norm()] };
-        let noisy =
-            values.into_iter().map(|v| if noise > 0.0 { v + rng.random_range(0.0..noise) } else { v });
+        let noisy = values.into_iter().map(|v| if noise > 0.0 { v + random.between(0.0, noise) } else { v });
         let cells: Vec<String> = q.iter().copied().chain(noisy).map(|x| format!("{x:.17}")).collect();
         text.push_str(&cells.join(","));
         text.push('\n');

@@ -4,9 +4,11 @@
 
 mod concealed;
 mod concealment;
+mod left_out;
 mod optimum;
 mod peers;
 mod physics;
 mod recordings;
 mod sets;
 mod side_branches;
+mod terms;

@@ -1,14 +1,12 @@
 //! Recordings of real machines, other people's data beside the project: geometry alone, judged where it was not fitted.
 //!
-//! `cargo test --release --test real_recordings -- --nocapture` prints the figures of `docs/accuracy.md`; with
-//! `KINCAL_COMPARE=1` also how losses and tolerances compare.
+//! `cargo test --release --test real recordings -- --ignored --nocapture` prints the figures of `docs/accuracy.md`;
+//! `cargo run --release --example measure -- losses` and `-- tolerances` how losses and tolerances compare.
 
-use super::sets::{Fold, Set, all, fanuc, gen3_lites, hilti, justin, kuka, pandas};
-use kincal::identify::{Loss, Options, calibrate, fit_setup};
-use kincal::machine::Tolerance;
-use kincal::predict::predict;
-use kincal::recording::Recording;
-use kincal::{CalibratedMachine, Machine};
+use kincal::identify::{Options, calibrate};
+
+use super::left_out::cross_validate;
+use super::sets::{Set, fanuc, gen3_lites, hilti, justin, kuka, pandas};
 
 /// RMS of 3-D position in mm: set-ups fitted to the machine as declared, and calibrated; on all rows, and on rows left out.
 #[derive(Clone, Copy, Debug)]
@@ -17,37 +15,6 @@ struct Figures {
     geometric: f64,
     held_out_nominal: f64,
     held_out: f64,
-}
-
-/// Root mean square over recordings, mm.
-fn rms(calibrated: &CalibratedMachine, recordings: &[Recording]) -> (f64, u64) {
-    recordings.iter().fold((0.0, 0), |(sum, count), recording| {
-        let found = predict(calibrated, recording, None).unwrap_or_else(|e| panic!("{e}"));
-        let mm = 1e3 * found.rms.m.expect("positions");
-        (sum + mm * mm * found.samples as f64, count + found.samples)
-    })
-}
-
-/// Cross-validation of a set with a machine, which may differ from the set's own in its tolerances.
-fn cross_validate(set: &Set, folds: &[Fold], machine: &Machine, options: Options) -> (f64, f64) {
-    let nominal = CalibratedMachine::nominal(machine.clone());
-    let (mut before, mut after, mut samples) = (0.0, 0.0, 0);
-    for fold in folds {
-        let (learnt, _) =
-            calibrate(machine, &fold.train, options).unwrap_or_else(|e| panic!("{}: {e}", set.name));
-        let place = if fold.setup.is_empty() { &fold.train } else { &fold.setup };
-        let placed = |known: &CalibratedMachine| {
-            fit_setup(known, place, options.loss).unwrap_or_else(|e| panic!("{}: {e}", set.name))
-        };
-        // What was learnt knows where its own set-up stands.
-        let learnt = if fold.setup.is_empty() { learnt } else { placed(&learnt) };
-        before += rms(&placed(&nominal), &fold.test).0;
-        let (sum, count) = rms(&learnt, &fold.test);
-        after += sum;
-        samples += count;
-    }
-    let mean = |sum: f64| (sum / samples as f64).sqrt();
-    (mean(before), mean(after))
 }
 
 fn figures(set: &Set, options: Options) -> Figures {
@@ -145,63 +112,4 @@ fn dlr_justin_at_poses_that_were_left_out() {
 #[ignore = "needs the data sets"]
 fn fanuc_r2000ic_at_a_pose_that_was_left_out() {
     reaches([fanuc()], &[("fanuc_r2000ic", 0.17, 0.235)]);
-}
-
-/// Comparisons are for reading, and take minutes: only on demand.
-fn wanted() -> bool {
-    let wanted = std::env::var_os("KINCAL_COMPARE").is_some();
-    if !wanted {
-        println!("skipped: set KINCAL_COMPARE=1 to see this comparison");
-    }
-    wanted
-}
-
-#[test]
-#[ignore = "needs the data sets"]
-fn losses_side_by_side() {
-    if !wanted() {
-        return;
-    }
-    let losses = [
-        ("squares", Loss::Squares),
-        ("huber 3", Loss::Huber { k: 3.0 }),
-        ("huber 2", Loss::Huber { k: 2.0 }),
-        ("huber 1.345", Loss::Huber { k: 1.345 }),
-        ("tukey 4.685", Loss::Tukey { c: 4.685 }),
-    ];
-    for set in all() {
-        let folds = set.folds();
-        let column = losses.map(|(name, loss)| {
-            let (_, held_out) =
-                cross_validate(&set, &folds, &set.machine, Options { loss, ..Options::default() });
-            format!("{name} {held_out:7.4}")
-        });
-        println!("{:<24} left out, mm: {}", set.name, column.join("  "));
-    }
-}
-
-/// The machine with another tolerance (mm, deg) of the frames that state none.
-fn with_tolerance(machine: &Machine, mm: f64, deg: f64) -> Machine {
-    let tolerance = Tolerance { translation: 1e-3 * mm, rotation: deg.to_radians() };
-    machine.clone().with_tolerance(tolerance).expect("positive")
-}
-
-#[test]
-#[ignore = "needs the data sets"]
-fn tolerances_side_by_side() {
-    if !wanted() {
-        return;
-    }
-    const DEGREES: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
-    for set in all() {
-        let folds = set.folds();
-        println!("{}, left out, mm; across: tolerance {DEGREES:?} deg", set.name);
-        for mm in [0.2, 0.5, 1.0, 2.0, 5.0] {
-            let held_out = DEGREES.map(|deg| {
-                let machine = with_tolerance(&set.machine, mm, deg);
-                format!("{:7.3}", cross_validate(&set, &folds, &machine, Options::default()).1)
-            });
-            println!("{mm:8} mm  {}", held_out.join("  "));
-        }
-    }
 }

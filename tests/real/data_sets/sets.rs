@@ -1,5 +1,7 @@
 //! Recordings of real machines by set, and how a set is split into what is learnt from and what is judged.
 
+use std::sync::LazyLock;
+
 use kincal::Machine;
 use kincal::feature::as_seen_in;
 use kincal::recording::{Recording, join};
@@ -203,15 +205,15 @@ pub fn fanuc() -> Set {
     Set::read("fanuc_r2000ic_165f", "fanuc_r2000ic", &["mark_A", "mark_B", "mark_C"], Split::Pose)
 }
 
-pub fn all() -> Vec<Set> {
-    let mut sets = vec![kuka()];
+/// Arms and single axes in which physics is looked for, each read once.
+pub static SETS: LazyLock<Vec<Set>> = LazyLock::new(|| {
+    let mut sets = vec![kuka(), hilti()];
     sets.extend(pandas());
-    sets.extend(gen3_lites());
-    sets.push(hilti());
     sets.extend(justin());
-    sets.push(fanuc());
+    sets.extend(justin_with_both_arms());
+    sets.extend(axes());
     sets
-}
+});
 
 /// Single axes against an encoder, a tracker, a resolver or a second measuring system, by their own names.
 pub fn axes() -> Vec<Set> {

@@ -1,29 +1,18 @@
 //! How often what is concealed in real recordings is named with its joint, and whether their own findings stay.
-//!
-//! ```text
-//! cargo run --release --example concealment -- --draws 60 --seed 7
-//! cargo run --release --example concealment -- --draws 60 --seed 7 --only 15,31 --write DIR
-//! ```
-
-#[path = "../tests/common/mod.rs"]
-mod common;
-#[path = "../tests/real/data_sets/concealed.rs"]
-mod concealed;
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 
-use clap::Parser;
+use clap::Args;
 use kincal::identify::{Loss, Options, calibrate};
 use kincal::machine::JointKind;
 use kincal::recording::Recording;
 
-use concealed::{Concealed, SETS, Set, names};
+use crate::concealed::{Concealed, SETS, Set, names};
 
-/// Conceals effects in the recordings of real machines and counts how many the diagnosis names.
-#[derive(Parser)]
-struct Arguments {
+#[derive(Args)]
+pub struct Arguments {
     /// How many effects are concealed, each in one set of recordings.
     #[arg(long, default_value_t = 6)]
     draws: usize,
@@ -120,8 +109,8 @@ struct Count {
     of: usize,
 }
 
-fn main() {
-    let arguments = Arguments::parse();
+/// Conceals, diagnoses and prints what was named.
+pub fn run(arguments: &Arguments) {
     let mut random = Random(arguments.seed);
     let mut sets: BTreeMap<usize, (Set, Own)> = BTreeMap::new();
     let mut table: BTreeMap<(&str, bool), Count> = BTreeMap::new();

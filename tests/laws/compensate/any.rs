@@ -1,0 +1,121 @@
+//! Any program at all: what is no axis word stays, and what cannot be corrected is refused.
+
+use super::*;
+
+/// The same cases on every run.
+fn fixed_cases() -> ProptestConfig {
+    ProptestConfig {
+        cases: 192,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(20_260_203),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
+/// A block of axis words and whatever else a program has.
+fn block() -> impl Strategy<Value = String> {
+    let number = (-9_000i32..9_000, 0usize..5).prop_map(|(n, d)| format!("{:.*}", d, f64::from(n) / 97.0));
+    let word =
+        (prop::sample::select(vec!["X", "Y", "Z", "A", "C"]), number, prop::sample::select(vec!["", " "]));
+    let words = prop::collection::vec(word, 0..5).prop_map(|words| {
+        let mut seen = Vec::new();
+        let mut text = String::new();
+        for (address, number, blank) in words {
+            if !seen.contains(&address) {
+                seen.push(address);
+                text.push_str(&format!("{address}{blank}{number} "));
+            }
+        }
+        text
+    });
+    let head = prop::sample::select(vec![
+        "",
+        "G1 ",
+        "G0 ",
+        "G90 ",
+        "N20 G1",
+        "N7 ",
+        "G21",
+        "G91 G1 ",
+        "G94 ",
+        "n30  g01 ",
+    ]);
+    let tail = prop::sample::select(vec!["", "F200", "(X1 (in) Y2)", ";C3", "M8", " S500 M3 (on)", "  \t"]);
+    let ending = prop::sample::select(vec!["\n", "\r\n"]);
+    (head, words, tail, ending).prop_map(|(h, w, t, e)| format!("{h}{w}{t}{e}"))
+}
+
+/// A text without its axis words and the blanks before them.
+fn without_axis_words(text: &str) -> Vec<u8> {
+    let mut program = Program::new("part.nc", text.as_bytes()).expect("readable");
+    let mut rest = Vec::new();
+    while let Some(block) = program.next_block().expect("readable") {
+        let bytes = block.bytes();
+        let mut at = 0;
+        for word in block.words().iter().filter(|w| AXES.contains(&w.address.as_str())) {
+            rest.extend(bytes[at..word.span.start].iter().filter(|b| **b != b' '));
+            at = word.span.end;
+        }
+        rest.extend(bytes[at..].iter().filter(|b| **b != b' '));
+    }
+    rest
+}
+
+proptest! {
+    #![proptest_config(fixed_cases())]
+
+    #[test]
+    fn a_nominal_machine_gives_every_byte_back(blocks in prop::collection::vec("\\PC{0,30}\n?", 0..20)) {
+        let nominal = CalibratedMachine::nominal(machine("ac_table_tilting"));
+        let text = blocks.concat();
+        let (out, _) = run(&nominal, &text, &Options::default());
+        prop_assert_eq!(out, text);
+    }
+
+    #[test]
+    fn nothing_but_axis_words_changes(blocks in prop::collection::vec(block(), 1..40)) {
+        let calibrated = erroneous("ac_table_tilting", 1.0);
+        let text = format!("G90 G0 X0 Y0 Z0 A30 C0\n{}", blocks.concat());
+        let (out, report) = run(&calibrated, &text, &Options::default());
+        prop_assert_eq!(without_axis_words(&out), without_axis_words(&text));
+        prop_assert_eq!(report.blocks as usize, text.lines().count());
+    }
+
+    #[test]
+    fn every_end_of_a_move_is_where_the_program_means_it(blocks in prop::collection::vec(block(), 1..30)) {
+        let calibrated = erroneous("ac_table_tilting", 1.0);
+        let text = format!("G90 G0 X0 Y0 Z0 A30 C0\n{}", blocks.concat());
+        let (out, report) = run(&calibrated, &text, &Options::default());
+        let (machine, actual) = (calibrated.machine(), calibrated.chain());
+        let (meant, sent) = (targets(&text, &AXES), targets(&out, &AXES));
+        prop_assert_eq!(meant.len(), sent.len());
+        for (meant, sent) in meant.iter().zip(&sent) {
+            prop_assert!(report.out_of_travel.count > 0 || tip_error(&actual, machine, meant, sent) < 1.1e-6, "{}\n{}", text, out);
+        }
+    }
+
+    #[test]
+    fn any_text_is_corrected_or_refused(blocks in prop::collection::vec("\\PC{0,20}", 0..12)) {
+        let calibrated = erroneous("bc_table_tilting", 1.0);
+        let setup = Setup::default();
+        let options = Options { arcs: Some(0.05), split: Some(0.05), ..Options::default() };
+        if let Err(error) = compensate_text(&calibrated, "any.nc", blocks.join("\n"), &setup, &options) {
+            prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
+        }
+    }
+
+    #[test]
+    fn any_words_are_corrected_or_refused(tokens in prop::collection::vec(prop::sample::select(vec![
+        "G0", "G1", "G2", "G3", "G17", "G18", "G19", "G20", "G21", "G28", "G43", "G43.4", "G49", "G52", "G53", "G54", "G68", "G69",
+        "G80", "G81", "G90", "G91", "G92", "G93", "X1", "Y-2.5", "Z.3", "A10", "C=20", "X[1+2]", "I3", "J-1", "K2", "R4", "P2", "F9",
+        "H1", "T1", "M6", "M98", "M99", "M30", "O100", "o100 sub\n", "o100 endsub\n", "\n", "\n", "\n", "TRAORI", "TRANS", "AROT", "SUPA", "(c)", ";e\n", "/", "%",
+        "MCALL CYCLE81(1,2)", "L X+1", "FMAX", "1e999", "X99999999999999999999", "D0", "IX3",
+    ]), 0..60)) {
+        let calibrated = erroneous("bc_table_tilting", 1.0);
+        let setup = Setup::parse("s.ron", r#"Setup(tools: {"1": 50}, work_offsets: {"G54": {"X": 3}})"#).expect("a set-up");
+        let options = Options { arcs: Some(0.05), split: Some(0.05), ..Options::default() };
+        if let Err(error) = compensate_text(&calibrated, "any.nc", tokens.join(" "), &setup, &options) {
+            prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
+        }
+    }
+}
