@@ -62,7 +62,7 @@ pub(crate) struct Common {
 }
 
 /// Runs the command line: 0 done, 1 input at fault, 2 usage.
-pub(crate) fn run() -> ExitCode {
+pub fn run() -> ExitCode {
     let command = Cli::parse().command;
     part::tidy_when_interrupted();
     let outcome = match command {

@@ -2,10 +2,10 @@
 //! calibration, and the diagnosis that names the effects.
 
 use crate::calibration::CalibratedMachine;
-use crate::diagnose::{Diagnosis, Request, diagnose};
+use crate::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
 use crate::effects::Library;
 use crate::error::Result;
-use crate::identify::{Fit, Options, calibrate};
+use crate::identify::{Fit, CalibrateOptions, calibrate};
 use crate::lie::{Twist, Vec3};
 use crate::machine::Machine;
 use crate::recording::Recording;
@@ -105,8 +105,8 @@ pub fn demo(seed: u64, progress: &dyn Fn(&str)) -> Result<Demo> {
     });
     let read = read.collect::<Result<Vec<_>>>()?;
     progress("calibrating");
-    let (calibrated, fit) = calibrate(&machine, &read, Options::default())?;
-    let request = Request::default();
+    let (calibrated, fit) = calibrate(&machine, &read, CalibrateOptions::default())?;
+    let request = DiagnoseOptions::default();
     let mut diagnosis = diagnose(&machine, &read, &Library::standard(), &request, progress)?;
     let diagnosed = diagnosis.model(&machine, &read, request.options, progress)?;
     Ok(Demo { truth, recordings: texts, calibrated, fit, diagnosis, diagnosed })

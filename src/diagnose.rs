@@ -58,6 +58,9 @@ mod waves;
 mod whereabouts;
 mod whitener;
 
+inner! {
+    use traces::{Along, Curve, CurvePoint, Trace, Traces};
+}
 pub use approaches::{SaidBy, StandsStill};
 pub use companions::Companion;
 pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
@@ -67,13 +70,12 @@ pub use outliers::{Outliers, WithoutOutliers};
 pub use set_ups::{LeftOutRms, SetUpLeftOut};
 pub use side_branches::UnseenSideBranch;
 pub use stretch::Where;
-pub use traces::{Along, Curve, CurvePoint, Trace, Traces};
 pub use unexplained::{Gathering, Unexplained};
 
 use crate::effects::{Library, RecordingFacts};
 use crate::error::Result;
 use crate::feature::as_seen_in;
-use crate::identify::Options;
+use crate::identify::CalibrateOptions;
 use crate::machine::Machine;
 use crate::recording::Recording;
 use not_tried::not_tried;
@@ -82,9 +84,9 @@ use side_branches::unseen;
 
 /// What a diagnosis is asked.
 #[derive(Clone, Debug, Default)]
-pub struct Request {
+pub struct DiagnoseOptions {
     /// How the constant geometry is identified.
-    pub options: Options,
+    pub options: CalibrateOptions,
 }
 
 /// Diagnoses what constant geometry leaves over in these recordings.
@@ -95,7 +97,7 @@ pub fn diagnose(
     machine: &Machine,
     recordings: &[Recording],
     library: &Library,
-    request: &Request,
+    request: &DiagnoseOptions,
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis> {
     let (whole, machine) = (machine, &as_seen_in(machine, recordings));

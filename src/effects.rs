@@ -21,16 +21,16 @@ mod soundness;
 mod wave;
 mod window;
 
-pub use candidate::{Candidate, Candidates, Coefficient, Parameter, Skipped};
-pub use facts::RecordingFacts;
+inner! {
+    use candidate::{Candidate, Candidates, Coefficient, Parameter, Skipped};
+    use facts::RecordingFacts;
+    use family::{Clock, Directions, Family, Grid, Less, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range, Seat, Size, Which};
+    use identified::Identified;
+    use place::Place;
+    use quantity::in_words;
+}
 pub(crate) use facts::by_setup;
-pub use family::{
-    Clock, Directions, Family, Grid, Less, LookAlike, Meaning, Output, ParameterForm, Partner, Pivot, Range,
-    Seat, Size, Which,
-};
 pub(crate) use grid::NO_TIME;
-pub use identified::{Identified, SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
+pub use identified::{SizeOf, StoredEffect, StoredPart, StoredSlot, StoredTerm};
 pub use library::Library;
-pub use place::Place;
-pub use quantity::in_words;
 pub use soundness::LibraryFault;

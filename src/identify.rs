@@ -23,12 +23,11 @@ mod unseen;
 mod upright;
 mod warnings;
 
+inner! {
+    use information::Information;
+}
 pub(crate) use evaluator::{EXTRAS, Evaluator, Moment, Values};
-pub use fit::{
-    BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit,
-    Suspect,
-};
-pub use information::Information;
+pub use fit::{BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit, Suspect};
 pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
 pub(crate) use optimum::{optimum, sources};
@@ -60,7 +59,7 @@ use upright::{Frames, turn_gravity, upright};
 
 /// How to identify.
 #[derive(Clone, Copy, Debug)]
-pub struct Options {
+pub struct CalibrateOptions {
     /// The walk to the optimum.
     pub solver: Solver,
     /// How residuals count.
@@ -69,15 +68,15 @@ pub struct Options {
     pub prior: bool,
 }
 
-impl Default for Options {
+impl Default for CalibrateOptions {
     fn default() -> Self {
-        Options { solver: Solver::default(), loss: Loss::default(), prior: true }
+        CalibrateOptions { solver: Solver::default(), loss: Loss::default(), prior: true }
     }
 }
 
 /// What to identify besides constant deviations, and from which samples.
 #[derive(Clone, Debug, Default)]
-pub struct Model {
+pub struct ErrorModel {
     /// What deviations depend on.
     pub varying: Varying,
     /// Dead bands of the directions of travel by command, m or rad; where there is none, 1e-5 of the command's range.
@@ -119,9 +118,9 @@ const NOISE_ROUNDS: usize = 12;
 pub fn calibrate(
     machine: &Machine,
     recordings: &[Recording],
-    options: Options,
+    options: CalibrateOptions,
 ) -> Result<(CalibratedMachine, Fit)> {
-    calibrate_model(machine, recordings, &Model::default(), options, &|_| {})
+    calibrate_model(machine, recordings, &ErrorModel::default(), options, &|_| {})
 }
 
 /// As [`calibrate`], of a model whose deviations vary, telling `progress` what it is at.
@@ -131,8 +130,8 @@ pub fn calibrate(
 pub fn calibrate_model(
     machine: &Machine,
     recordings: &[Recording],
-    model: &Model,
-    options: Options,
+    model: &ErrorModel,
+    options: CalibrateOptions,
     progress: &dyn Fn(&str),
 ) -> Result<(CalibratedMachine, Fit)> {
     upright(|frames| attempt(machine, recordings, model, options, frames, progress))
@@ -141,8 +140,8 @@ pub fn calibrate_model(
 fn attempt(
     machine: &Machine,
     recordings: &[Recording],
-    model: &Model,
-    options: Options,
+    model: &ErrorModel,
+    options: CalibrateOptions,
     frames: Option<&[Pose<f64>]>,
     progress: &dyn Fn(&str),
 ) -> Result<((CalibratedMachine, Fit), Frames)> {

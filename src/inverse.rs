@@ -29,7 +29,7 @@ pub enum Mode {
 
 /// How hard to try.
 #[derive(Clone, Copy, Debug)]
-pub struct Options {
+pub struct InverseOptions {
     /// Singular value (rad of tool direction per rad of joint, or as a part of the largest where lengths take
     /// part) below which a direction fades out.
     pub weak: f64,
@@ -43,9 +43,9 @@ pub struct Options {
     pub within_travel: bool,
 }
 
-impl Default for Options {
+impl Default for InverseOptions {
     fn default() -> Self {
-        Options { weak: 0.02, steps: 60, position_m: 1e-10, angle_rad: 1e-10, within_travel: true }
+        InverseOptions { weak: 0.02, steps: 60, position_m: 1e-10, angle_rad: 1e-10, within_travel: true }
     }
 }
 
@@ -101,7 +101,7 @@ pub struct Solution {
 pub struct Inverse<'a> {
     machine: &'a Machine,
     mode: Mode,
-    options: Options,
+    options: InverseOptions,
     /// Equations of orientation that the machine has joints for on general poses.
     turns: usize,
     /// The same of position.
@@ -179,7 +179,7 @@ impl<'a> Inverse<'a> {
         let mut inverse = Inverse {
             machine,
             mode: Mode::Pose,
-            options: Options::default(),
+            options: InverseOptions::default(),
             turns: 0,
             shifts: 0,
             by_slides: false,
@@ -202,7 +202,7 @@ impl<'a> Inverse<'a> {
     }
 
     /// With other limits.
-    pub fn with_options(&self, options: Options) -> Self {
+    pub fn with_options(&self, options: InverseOptions) -> Self {
         Inverse { options, ..self.clone() }
     }
 
@@ -461,7 +461,7 @@ impl<'a> Inverse<'a> {
 
     /// Why the goal was missed: a direction lost at this pose, or one that the free joints never have.
     fn missed(&self, look: &Look, free: &[bool]) -> Outcome {
-        let Options { weak, .. } = self.options;
+        let InverseOptions { weak, .. } = self.options;
         let mut lost: Option<(f64, Twist<f64>)> = None;
         let mut consider = |rows: DMatrix<f64>,
                             rank: usize,

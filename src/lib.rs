@@ -16,7 +16,8 @@
 //!
 //! # Rooms
 //!
-//! One noun a room. Imports run one way: a room uses only rooms above it in this table, and a test holds it to that.
+//! One noun a room. Imports run one way: a room uses only rooms above it in this table, and a test holds it to that. Rooms without a link
+//! are for this crate alone; the feature `internals` opens them to its own tests, without any promise.
 //!
 //! | room | noun |
 //! | --- | --- |
@@ -29,33 +30,34 @@
 //! | `document` | RON texts, and where in them each value stands |
 //! | [`machine`] | dyads, joints, the machine file |
 //! | [`chain`] | poses and Jacobian rows of a machine with given deviations |
-//! | [`sensor`] | what instruments read, and how that depends on every unknown |
-//! | [`check`] | every Jacobian against forward-mode autodiff |
+//! | `sensor` | what instruments read, and how that depends on every unknown |
+//! | `check` | every Jacobian against forward-mode autodiff |
 //! | [`recording`] | CSV recordings, streamed |
-//! | [`motion`] | directions of travel, velocities, the history of a path |
-//! | [`feature`] | what a deviation depends on, as a number for each sample |
-//! | [`error_motion`] | smooth deviations along the travel of a joint |
-//! | [`variation`] | deviations that are not constant: pieces by direction, terms |
+//! | `motion` | directions of travel, velocities, the history of a path |
+//! | `feature` | what a deviation depends on, as a number for each sample |
+//! | `error_motion` | smooth deviations along the travel of a joint |
+//! | `variation` | deviations that are not constant: pieces by direction, terms |
 //! | [`effects`] | the physics that a kinematic model leaves out, as data |
 //! | `calibration` | [`CalibratedMachine`]: a machine file with its deviations |
 //! | [`location`] | the same geometry as ISO 230-1 location errors |
 //! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
-//! | [`rivals`] | identification by other schemes, and a filter, judged side by side |
+//! | `rivals` | identification by other schemes, and a filter, judged side by side |
 //! | [`diagnose`](mod@diagnose) | where model and recordings differ, and what physics was left out |
 //! | [`inverse`] | commands that bring the tool to a pose, for any chain |
-//! | [`nc`] | NC programs: blocks, words, modal state; written back byte for byte |
+//! | `nc` | NC programs: blocks, words, modal state; written back byte for byte |
 //! | [`compensate`](mod@compensate) | NC programs rewritten so that the actual machine cuts what they mean |
 //! | [`simulate`] | recordings of machines whose errors are known: faults, tests, instruments |
-//! | [`demo`](mod@demo) | the reference machine, a simulated recording, and what a diagnosis says of it |
+//! | `demo` | the reference machine, a simulated recording, and what a diagnosis says of it |
+//! | `cli` | the command line, a thin face over all of it (feature `cli`) |
 //!
 //! # A complete example
 //!
 //! A single linear axis measured by a tracker: declare, simulate an error, calibrate, compare.
 //!
 //! ```
-//! use kincal::identify::{Options, calibrate};
+//! use kincal::identify::{CalibrateOptions, calibrate};
 //! use kincal::recording::Recording;
 //! use kincal::Machine;
 //!
@@ -73,7 +75,7 @@
 //!            300,300.000,0.000,79.971\n\
 //!            400,399.999,0.000,79.960\n";
 //! let recordings = [Recording::from_bytes("slide.csv", csv.as_bytes(), &machine)?];
-//! let (calibrated, fit) = calibrate(&machine, &recordings, Options::default())?;
+//! let (calibrated, fit) = calibrate(&machine, &recordings, CalibrateOptions::default())?;
 //! let rms = fit.rms.m.expect("lengths were measured");
 //! assert!(rms.geometric < 0.1 * rms.nominal);
 //! // The carriage moves along a line that is pitched by 0.1 mrad against the workpiece.
@@ -83,41 +85,96 @@
 //! ```
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]
+// What only tests use is used by nobody where they are not built.
+#![cfg_attr(not(feature = "internals"), allow(dead_code, unused_imports))]
+// Rooms of this crate explain themselves to its developers, and link to each other.
+#![allow(rustdoc::private_intra_doc_links)]
+
+/// `use` of items that a public room keeps to this crate and, by the feature `internals`, to its tests.
+macro_rules! inner {
+    ($(use $path:ident::$items:tt;)+) => {$(
+        #[cfg(feature = "internals")]
+        #[doc(hidden)]
+        pub use $path::$items;
+        #[cfg(not(feature = "internals"))]
+        pub(crate) use $path::$items;
+    )+};
+}
 
 mod calibration;
 pub mod chain;
+#[cfg(not(feature = "internals"))]
+mod check;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod check;
+#[cfg(feature = "cli")]
+mod cli;
 pub mod compensate;
+#[cfg(not(feature = "internals"))]
+mod demo;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod demo;
 pub mod describe;
 pub mod diagnose;
 mod document;
 pub mod effects;
 pub mod error;
+#[cfg(not(feature = "internals"))]
+mod error_motion;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod error_motion;
+#[cfg(not(feature = "internals"))]
+mod feature;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod feature;
 pub mod identify;
 pub mod inverse;
 pub mod lie;
 pub mod location;
 pub mod machine;
+#[cfg(not(feature = "internals"))]
+mod motion;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod motion;
+#[cfg(not(feature = "internals"))]
+mod nc;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod nc;
 pub mod predict;
 pub mod recording;
 mod residual;
+#[cfg(not(feature = "internals"))]
+mod rivals;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod rivals;
 mod scalar;
 pub mod sensor;
 pub mod simulate;
 pub mod units;
+#[cfg(not(feature = "internals"))]
+mod variation;
+#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod variation;
 mod wording;
 
 pub use calibration::{CalibratedMachine, LeftOut};
 pub use chain::{Chain, Sweep};
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use cli::run as run_command_line;
 pub use error::{Error, Place, Result};
 pub use machine::Machine;
+/// The linear algebra of this crate's interface: [`lie`] converts to and from its poses and vectors.
+pub use nalgebra;
+pub use recording::Recording;
 pub use scalar::Scalar;
 
 /// The README's examples run as tests.

@@ -1,10 +1,8 @@
-//! The command line: parses arguments, calls the library, prints.
+//! The program: all that it does is in the library's room `cli`.
 #![forbid(unsafe_code)]
-
-mod cli;
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::run()
+    kincal::run_command_line()
 }

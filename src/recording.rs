@@ -27,14 +27,17 @@ mod step;
 mod summary;
 mod text;
 
+inner! {
+    use column::{Column, Role};
+    use reader::{Block, Chunk, Chunks, Row, Rows};
+    use summary::Summary;
+}
 pub use call::open_all;
-pub use column::{Channel, Column, Role};
+pub use column::Channel;
 pub use fault::RecordingFault;
 pub use header::{Header, Measurement, NominalLength, Sigma, ToolPoint};
 pub use join::{Joined, join};
-pub use reader::{Block, Chunk, Chunks, Row, Rows};
 pub(crate) use step::step_of;
-pub use summary::Summary;
 
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};

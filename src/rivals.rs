@@ -45,7 +45,7 @@ pub use step::Step;
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
 use crate::feature::Feature;
-use crate::identify::{Loss, Model, Options, Solver, Stop, calibrate, calibrate_model};
+use crate::identify::{Loss, ErrorModel, CalibrateOptions, Solver, Stop, calibrate, calibrate_model};
 use crate::lie::Twist;
 use crate::machine::{JointKind, Machine};
 use crate::recording::Recording;
@@ -57,13 +57,13 @@ pub enum Rival {
     /// The machine as declared; nothing is fitted.
     Declared,
     /// The local model with one of its own solvers, as `kincal calibrate` runs it.
-    Local(Options),
+    Local(CalibrateOptions),
     /// A scheme of the literature.
     Scheme(Scheme),
     /// The local model with explicit backlash of every rotary axis: one coefficient along its joint, flipping with its direction.
-    Backlash(Options),
+    Backlash(CalibrateOptions),
     /// A local model for each pattern of directions of the rotary axes.
-    Pieces(Options),
+    Pieces(CalibrateOptions),
     /// The local model by an extended Kalman filter, sample by sample in the order of the recordings.
     Kalman(KalmanOptions),
 }
@@ -100,12 +100,12 @@ impl Rival {
     /// Every rival that has a name, in the order in which `kincal compare` lists them.
     pub fn named(tuning: Tuning) -> Vec<(&'static str, Rival)> {
         let Tuning { tau, cut, steps } = tuning;
-        let local = |solver| Rival::Local(Options { solver, loss: Loss::Squares, prior: false });
+        let local = |solver| Rival::Local(CalibrateOptions { solver, loss: Loss::Squares, prior: false });
         let scheme = |form, step| Rival::Scheme(Scheme { form, step, steps });
         let (damped, truncated) = (Step::Damped { tau }, Step::Truncated { cut, unit_m: 1.0 });
         vec![
             ("declared", Rival::Declared),
-            ("local", Rival::Local(Options::default())),
+            ("local", Rival::Local(CalibrateOptions::default())),
             ("local-gauss-newton", local(Solver::GaussNewton)),
             ("local-damped", local(Solver::FixedDamping { tau, steps })),
             ("local-truncated", local(Solver::RankTruncation { cut })),
@@ -115,8 +115,8 @@ impl Rival {
             ("tangent-truncated", scheme(Form::Tangent, truncated)),
             ("free-damped", scheme(Form::Free, damped)),
             ("free-truncated", scheme(Form::Free, truncated)),
-            ("backlash", Rival::Backlash(Options::default())),
-            ("pieces", Rival::Pieces(Options::default())),
+            ("backlash", Rival::Backlash(CalibrateOptions::default())),
+            ("pieces", Rival::Pieces(CalibrateOptions::default())),
             ("kalman", Rival::Kalman(KalmanOptions::default())),
         ]
     }
@@ -147,9 +147,9 @@ fn varying(
     machine: &Machine,
     recordings: &[Recording],
     varying: Varying,
-    options: Options,
+    options: CalibrateOptions,
 ) -> Result<Fitted> {
-    let model = Model { varying, ..Model::default() };
+    let model = ErrorModel { varying, ..ErrorModel::default() };
     let (calibrated, fit) = calibrate_model(machine, recordings, &model, options, &|_| {})?;
     Ok(Fitted { calibrated, steps: fit.steps, stop: fit.stop })
 }

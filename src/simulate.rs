@@ -41,22 +41,27 @@ use crate::error::Result;
 use crate::lie::Twist;
 use crate::machine::Machine;
 
-pub use commands::CommandTable;
-pub use cone::cone;
-pub use course::{At, Course, Sample, Samples};
-pub use faults::{Faults, Width};
-pub use instrument::{Instrument, Scatter, noise_of};
-pub use inverse::inverse;
-pub use paper::{paper_path, paper_plant};
-pub use part_program::{Drive, PartProgram};
-pub use plant::{Plant, State};
-pub use poses::RandomPoses;
-pub use profile::{Leg, Pace, Profile, ticks};
-pub use program_out::write_program;
-pub use record::{Claims, Recorder, Style, Written};
-pub use standard::{Family, Standard};
-pub use turning::{Balls, Figure, Pointing, Rounding, Turning, Wave};
-pub use turns::{Sense, Turns, plane_across, plane_of_axes, rest, usual_range};
+inner! {
+    use commands::CommandTable;
+    use cone::cone;
+    use course::{At, Course, Sample, Samples};
+    use faults::Width;
+    use instrument::noise_of;
+    use inverse::inverse;
+    use paper::{paper_path, paper_plant};
+    use part_program::{Drive, PartProgram};
+    use plant::State;
+    use poses::RandomPoses;
+    use profile::{Leg, Pace, Profile, ticks};
+    use program_out::write_program;
+    use record::{Claims, Recorder, Style, Written};
+    use standard::{Family, Standard};
+    use turning::{Balls, Figure, Pointing, Rounding, Turning, Wave};
+    use turns::{Sense, Turns, plane_across, plane_of_axes, rest, usual_range};
+}
+pub use faults::Faults;
+pub use instrument::{Instrument, Scatter};
+pub use plant::Plant;
 
 use instrument::normal;
 

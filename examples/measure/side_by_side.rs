@@ -4,7 +4,7 @@ use std::path::Path;
 
 use kincal::Machine;
 use kincal::effects::Library;
-use kincal::identify::{Loss, Options};
+use kincal::identify::{Loss, CalibrateOptions};
 use kincal::machine::Tolerance;
 
 use crate::left_out::cross_validate;
@@ -24,7 +24,7 @@ pub fn losses() {
         let folds = set.folds();
         let column = losses.map(|(name, loss)| {
             let (_, held_out) =
-                cross_validate(&set, &folds, &set.machine, Options { loss, ..Options::default() });
+                cross_validate(&set, &folds, &set.machine, CalibrateOptions { loss, ..CalibrateOptions::default() });
             format!("{name} {held_out:7.4}")
         });
         println!("{:<24} left out, mm: {}", set.name, column.join("  "));
@@ -46,7 +46,7 @@ pub fn tolerances() {
         for mm in [0.2, 0.5, 1.0, 2.0, 5.0] {
             let held_out = DEGREES.map(|deg| {
                 let machine = with_tolerance(&set.machine, mm, deg);
-                format!("{:7.3}", cross_validate(&set, &folds, &machine, Options::default()).1)
+                format!("{:7.3}", cross_validate(&set, &folds, &machine, CalibrateOptions::default()).1)
             });
             println!("{mm:8} mm  {}", held_out.join("  "));
         }

@@ -4,12 +4,13 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use kincal::identify::{Figures, Fit, Loss, Model, Options, Solver, calibrate_model};
-use kincal::machine::JointKind;
-use kincal::units::Rms;
-use kincal::units::{Quantity, Unit, amount};
-use kincal::variation::{Directions, MOST_AXES, Varying};
-use kincal::{CalibratedMachine, Machine};
+use crate::identify::{Figures, Fit, Loss, ErrorModel, CalibrateOptions, Solver, calibrate_model};
+use crate::machine::JointKind;
+use crate::units::Rms;
+use crate::units::{Quantity, Unit, amount};
+use crate::variation::{Directions, MOST_AXES, Varying};
+use crate::calibration::CalibratedMachine;
+use crate::machine::Machine;
 
 use super::Common;
 use super::output::{
@@ -93,7 +94,7 @@ pub(crate) struct Args {
 
 impl Args {
     /// The model asked for.
-    fn model(&self, machine: &Machine) -> Outcome<Model> {
+    fn model(&self, machine: &Machine) -> Outcome<ErrorModel> {
         let mut axes = Vec::new();
         for name in &self.directions {
             let c = command(machine, name)?;
@@ -136,17 +137,17 @@ impl Args {
             dead_bands[c] = Some(band);
         }
         let directions = (!axes.is_empty()).then(|| Directions::new(axes));
-        Ok(Model {
+        Ok(ErrorModel {
             varying: Varying { directions, terms: Vec::new() },
             dead_bands,
             samples: self.samples,
             error_motions: self.error_motions,
-            ..Model::default()
+            ..ErrorModel::default()
         })
     }
 
-    fn options(&self) -> Options {
-        Options {
+    fn options(&self) -> CalibrateOptions {
+        CalibrateOptions {
             solver: match self.solver {
                 SolverWord::Lm => Solver::LevenbergMarquardt,
                 SolverWord::FixedDamping => Solver::FixedDamping { tau: self.tau, steps: self.steps },

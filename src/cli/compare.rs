@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use kincal::rivals::{Arena, Rival, Tuning, Verdict, split};
-use kincal::{CalibratedMachine, Machine};
+use crate::rivals::{Arena, Rival, Tuning, Verdict, split};
+use crate::calibration::CalibratedMachine;
+use crate::machine::Machine;
 use serde::Serialize;
 
 use super::Common;
@@ -136,7 +137,7 @@ fn same_frames(
     path: &std::path::Path,
 ) -> Outcome<CalibratedMachine> {
     let shape = |m: &Machine| {
-        let joint = |d: &kincal::machine::Dyad| d.joint.as_ref().map(|j| (j.name.clone(), j.kind));
+        let joint = |d: &crate::machine::Dyad| d.joint.as_ref().map(|j| (j.name.clone(), j.kind));
         let dyads: Vec<_> = m.dyads().iter().map(|d| (d.frame.clone(), joint(d))).collect();
         (dyads, m.workpiece_count())
     };

@@ -3,11 +3,11 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use kincal::CalibratedMachine;
-use kincal::compensate::{Listed, Options, Report, Setup, UnknownWay, Worst, compensate};
-use kincal::inverse::Mode;
-use kincal::nc::Dialect;
-use kincal::units::{Quantity, Unit};
+use crate::calibration::CalibratedMachine;
+use crate::compensate::{Listed, Options, Report, Setup, UnknownWay, Worst, compensate};
+use crate::inverse::Mode;
+use crate::nc::Dialect;
+use crate::units::{Quantity, Unit};
 
 use super::Common;
 use super::output::{Failure, Outcome, angle, check_outputs, count, length, open_machine, write_whole};
@@ -339,7 +339,7 @@ fn notes(r: &Report) -> String {
 
 #[cfg(test)]
 mod tests {
-    use kincal::compensate::Reversal;
+    use crate::compensate::Reversal;
 
     use super::*;
 

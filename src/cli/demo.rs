@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use kincal::demo::demo;
+use crate::demo::demo;
 
 use super::output::{Outcome, check_outputs, length};
 use super::{Common, calibrate, diagnose};

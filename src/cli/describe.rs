@@ -3,11 +3,11 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use kincal::CalibratedMachine;
-use kincal::describe::{Description, DyadDescription, describe};
-use kincal::identify::reach;
-use kincal::lie::{Twist, Vec3};
-use kincal::machine::JointKind;
+use crate::calibration::CalibratedMachine;
+use crate::describe::{Description, DyadDescription, describe};
+use crate::identify::reach;
+use crate::lie::{Twist, Vec3};
+use crate::machine::JointKind;
 use serde_json::{Value, json};
 
 use super::Common;

@@ -7,9 +7,9 @@ mod text;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use kincal::Machine;
-use kincal::diagnose::{Diagnosis, Request, diagnose};
-use kincal::effects::Library;
+use crate::machine::Machine;
+use crate::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use crate::effects::Library;
 
 use super::Common;
 use super::output::{Outcome, check_outputs, open_machine, open_recordings, write_whole};
@@ -58,7 +58,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         }
     }
     let progress = args.common.progress();
-    let request = Request::default();
+    let request = DiagnoseOptions::default();
     let found = diagnose(&machine, &recordings, &library, &request, &|text| progress.say(text)).and_then(
         |mut found| {
             let wanted = args.output.is_some() || !found.findings.is_empty();

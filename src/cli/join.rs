@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use kincal::recording::join;
+use crate::recording::join;
 
 use super::Common;
 use super::output::{Outcome, check_outputs, count, write_whole};

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use kincal::location::LocationErrors;
+use crate::location::LocationErrors;
 
 use super::output::{Kind, length, table};
 

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use indicatif::ProgressBar;
-use kincal::recording::{Recording, open_all};
-use kincal::{Error, Machine, Place};
+use crate::recording::{Recording, open_all};
+use crate::error::{Error, Place};
+use crate::machine::Machine;
 
 use super::Common;
 use super::part::Part;
@@ -75,7 +76,7 @@ fn misplaced(path: &Path, is: &str, expected: &str) -> Failure {
 }
 
 /// Opens a machine file by `open`; a recording in its place is told as such.
-pub(crate) fn open_machine<T>(path: &Path, open: impl FnOnce(&Path) -> kincal::Result<T>) -> Outcome<T> {
+pub(crate) fn open_machine<T>(path: &Path, open: impl FnOnce(&Path) -> crate::error::Result<T>) -> Outcome<T> {
     open(path).map_err(|error| match looks_like(path) {
         Some(Looks::Recording) => misplaced(path, "recording", "machine file"),
         _ => error.into(),
@@ -188,7 +189,7 @@ impl<W: Write> Write for Watched<W> {
 fn write_into(
     file: std::fs::File,
     path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> kincal::Result<()>,
+    write: impl FnOnce(&mut dyn Write) -> crate::error::Result<()>,
 ) -> Outcome {
     let inner = std::io::BufWriter::with_capacity(1 << 18, file);
     let mut out = Watched { inner, failed: None };
@@ -202,7 +203,7 @@ fn write_into(
 
 /// Writes a file whole or not at all: into a neighbour first, then renamed. A link stays a link, and its file is
 /// replaced; what is no file (a pipe, `/dev/null`) is written to as it is, since a file in its place would end it.
-pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> kincal::Result<()>) -> Outcome {
+pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> crate::error::Result<()>) -> Outcome {
     let failed = |source: std::io::Error| not_written(path, &source);
     let known = std::fs::metadata(path).ok();
     if known.as_ref().is_some_and(|it| !it.is_file() && !it.is_dir()) {

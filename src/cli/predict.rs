@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use kincal::CalibratedMachine;
-use kincal::identify::{Loss, fit_setup};
-use kincal::predict::{Prediction, predict};
+use crate::calibration::CalibratedMachine;
+use crate::identify::{Loss, fit_setup};
+use crate::predict::{Prediction, predict};
 
 use super::Common;
 use super::output::{

@@ -7,9 +7,9 @@ mod build;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use kincal::CalibratedMachine;
-use kincal::machine::JointKind;
-use kincal::simulate::{Session, Style, Written};
+use crate::calibration::CalibratedMachine;
+use crate::machine::JointKind;
+use crate::simulate::{Session, Style, Written};
 use serde_json::json;
 
 use super::output::{Kind, Outcome, check_outputs, count, length, open_machine, table, write_whole};
@@ -62,7 +62,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     if let Some(path) = &args.nc {
         progress.say("writing the NC program");
-        write_whole(path, |out| kincal::simulate::write_program(plant.machine(), &runs, out))?;
+        write_whole(path, |out| crate::simulate::write_program(plant.machine(), &runs, out))?;
     }
     if let Some(path) = &args.truth {
         let truth = plant.truth(&machine);
@@ -110,8 +110,8 @@ fn names(output: &Path, runs: usize) -> Vec<PathBuf> {
 
 fn summary(
     args: &Args,
-    machine: &kincal::Machine,
-    plant: &kincal::simulate::Plant,
+    machine: &crate::machine::Machine,
+    plant: &crate::simulate::Plant,
     files: &[PathBuf],
     all: &[Written],
     lengths: &[Option<f64>],
@@ -200,8 +200,8 @@ fn range(all: &[Written], c: usize) -> (f64, f64) {
 
 fn result(
     args: &Args,
-    machine: &kincal::Machine,
-    plant: &kincal::simulate::Plant,
+    machine: &crate::machine::Machine,
+    plant: &crate::simulate::Plant,
     files: &[PathBuf],
     all: &[Written],
     lengths: &[Option<f64>],

@@ -6,7 +6,7 @@
 use super::frame::Frame;
 use super::setup::{Setup, ToolAxis};
 use crate::chain::Chain;
-use crate::inverse::{Goal, Inverse, Mode, Options};
+use crate::inverse::{Goal, Inverse, InverseOptions, Mode};
 use crate::lie::{Mat3, Pose, Vec3};
 use crate::machine::{Branch, JointKind, Machine};
 use crate::nc::{Plane, Units};
@@ -70,7 +70,7 @@ impl<'a> Control<'a> {
         axes.sort_by_key(|a| (a.tip.map_or(3, |k| k), a.address.clone()));
         let count = axes.len();
         // What the program means is asked here, not whether the machine can.
-        let exact = Options { within_travel: false, ..Options::default() };
+        let exact = InverseOptions { within_travel: false, ..InverseOptions::default() };
         let mut control = Control {
             machine,
             setup,

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
 use crate::identify::{
-    EXTRAS, Evaluator, Fit, Known, Layout, Moment, Options, Places, Role, Source, Sources, Stretch, Unknowns,
+    EXTRAS, Evaluator, Fit, Known, Layout, Moment, CalibrateOptions, Places, Role, Source, Sources, Stretch, Unknowns,
     optimum, sources,
 };
 use crate::machine::Machine;
@@ -88,7 +88,7 @@ const ENOUGH: usize = 4096;
 pub(super) fn linear(
     machine: &Machine,
     recordings: &[Recording],
-    options: Options,
+    options: CalibrateOptions,
     dead_bands: &[f64],
     progress: &dyn Fn(&str),
 ) -> Result<Linear> {

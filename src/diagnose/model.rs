@@ -6,7 +6,7 @@ use crate::calibration::{CalibratedMachine, terms};
 use crate::effects::{RecordingFacts, StoredEffect};
 use crate::error::{Error, Result};
 use crate::feature::as_seen_in;
-use crate::identify::{Model, Options, calibrate_model};
+use crate::identify::{ErrorModel, CalibrateOptions, calibrate_model};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::sensor::Sensor;
@@ -23,7 +23,7 @@ impl Diagnosis {
         &mut self,
         machine: &Machine,
         recordings: &[Recording],
-        options: Options,
+        options: CalibrateOptions,
         progress: &dyn Fn(&str),
     ) -> Result<CalibratedMachine> {
         let machine = &as_seen_in(machine, recordings);
@@ -45,11 +45,11 @@ impl Diagnosis {
             }));
         }
         progress("fitting geometry and effects together");
-        let model = Model {
+        let model = ErrorModel {
             varying: Varying { directions: None, terms: all },
             dead_bands: by_command(machine, &facts.dead_bands),
             approaches: self.stand_still.iter().map(|still| still.approach).collect(),
-            ..Model::default()
+            ..ErrorModel::default()
         };
         let (calibrated, fit) = calibrate_model(machine, recordings, &model, options, progress)?;
         let last = |by: &mut Option<RmsByModel>, rms: Option<f64>| {

@@ -17,7 +17,7 @@ use super::speeds::less_rare;
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Library, RecordingFacts};
 use crate::error::Result;
-use crate::identify::Options;
+use crate::identify::CalibrateOptions;
 use crate::machine::Machine;
 use crate::recording::Recording;
 
@@ -38,7 +38,7 @@ pub(super) struct Case<'a> {
     pub recordings: &'a [Recording],
     pub library: &'a Library,
     pub facts: &'a RecordingFacts,
-    pub options: Options,
+    pub options: CalibrateOptions,
     pub progress: &'a dyn Fn(&str),
 }
 

@@ -11,7 +11,7 @@ use super::solve::Problem;
 use super::source::{Known, Which};
 use super::unknowns::{Block, Role, Unknowns};
 use super::warnings::warnings;
-use super::{Found, Information, Loss, Options, Solver, Stop};
+use super::{Found, Information, Loss, CalibrateOptions, Solver, Stop};
 
 use crate::error::Result;
 use crate::lie::Vec3;
@@ -213,7 +213,7 @@ pub(super) fn report(
     declared: &Unknowns,
     found: &Found,
     information: Information,
-    options: Options,
+    options: CalibrateOptions,
 ) -> Result<Fit> {
     let (machine, sources, layout) = (problem.machine, problem.sources, problem.layout);
     let tallies = &found.solution.normal.tallies;

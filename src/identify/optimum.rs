@@ -3,7 +3,7 @@
 use super::source::Sources;
 use super::unknowns::{Layout, Unknowns};
 use super::{
-    Fit, Info, Model, Options, Placed, Problem, enough_for_setups, enough_to_start, fit, information,
+    Fit, Info, ErrorModel, CalibrateOptions, Placed, Problem, enough_for_setups, enough_to_start, fit, information,
     is_of_setup, place, settle,
 };
 use crate::error::Result;
@@ -24,14 +24,14 @@ pub(crate) fn sources<'a>(
     recordings: &'a [Recording],
     progress: &dyn Fn(&str),
 ) -> Result<Sources<'a>> {
-    Sources::new(recordings, machine, &CONSTANT, &Model::default().dead_bands, progress)
+    Sources::new(recordings, machine, &CONSTANT, &ErrorModel::default().dead_bands, progress)
 }
 
 /// Calibrates with constant deviations.
 pub(crate) fn optimum<'a>(
     machine: &'a Machine,
     recordings: &'a [Recording],
-    options: Options,
+    options: CalibrateOptions,
     progress: &dyn Fn(&str),
 ) -> Result<Optimum<'a>> {
     let sources = sources(machine, recordings, progress)?;

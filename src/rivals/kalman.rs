@@ -14,7 +14,7 @@ use super::state;
 use crate::calibration::CalibratedMachine;
 use crate::chain::deviation_jacobian;
 use crate::error::{Error, Result};
-use crate::identify::{COMPONENTS, Loss, Options, Stop, calibrate};
+use crate::identify::{COMPONENTS, Loss, CalibrateOptions, Stop, calibrate};
 use crate::lie::{Pose, Twist};
 use crate::machine::{Machine, Tolerance};
 use crate::recording::Recording;
@@ -334,7 +334,7 @@ fn miscounted(what: &str, got: usize, expected: usize) -> Error {
 pub(super) fn fit(machine: &Machine, recordings: &[Recording], options: KalmanOptions) -> Result<Fitted> {
     let silent = |r: &Recording| r.header().sigma.is_none() || r.value_count() == 6;
     let fallback = if options.noise.is_none() && recordings.iter().any(silent) {
-        let batch = Options { loss: options.loss, ..Options::default() };
+        let batch = CalibrateOptions { loss: options.loss, ..CalibrateOptions::default() };
         Some(calibrate(machine, recordings, batch)?.1.recordings)
     } else {
         None

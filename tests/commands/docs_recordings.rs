@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common;
-use kincal::identify::{BeforeAfter, Options, calibrate};
+use kincal::identify::{BeforeAfter, CalibrateOptions, calibrate};
 use kincal::recording::Recording;
 use kincal::{CalibratedMachine, Machine};
 
@@ -45,7 +45,7 @@ fn examples_of_recordings_parse_and_cover_every_measurement() {
 fn examples_of_recordings_calibrate_and_are_of_their_machine() {
     for example in blocks("recordings.md", "csv") {
         let (machine, recording) = recorded(&example);
-        let (_, fit) = calibrate(&machine, &[recording], Options::default())
+        let (_, fit) = calibrate(&machine, &[recording], CalibrateOptions::default())
             .unwrap_or_else(|e| panic!("{e}: {}\n{example}", e.mend()));
         // Readings of this machine: as declared it explains them within five of its tolerances, at a reach of a metre.
         let tolerances = (0..machine.dyads().len()).map(|j| machine.tolerance(j));

@@ -1,7 +1,7 @@
 //! Set-ups found from nothing: frames, tool points, lengths and zeros, whatever the machine file says of frame `w`.
 
 use crate::common;
-use kincal::identify::{Fit, Options, calibrate, fit_setup};
+use kincal::identify::{Fit, CalibrateOptions, calibrate, fit_setup};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::machine::Placement;
 use kincal::predict::predict;
@@ -48,7 +48,7 @@ fn foreign(sensor: Sensor, header: &[&str], noise_free: bool, seed: u64) -> (Mac
 fn run(machine: &Machine, csv: &str) -> (CalibratedMachine, Fit) {
     let recordings =
         [Recording::from_bytes("r.csv", csv.as_bytes(), machine).unwrap_or_else(|e| panic!("{e}"))];
-    calibrate(machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"))
+    calibrate(machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn distance(a: Pose<f64>, b: Pose<f64>) -> (f64, f64) {
@@ -198,7 +198,7 @@ fn recordings_of_several_set_ups_share_the_machine_but_not_the_frame() {
     };
     let recordings: Vec<_> = texts.iter().map(open).collect();
     let (calibrated, fit) =
-        calibrate(&declared, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
+        calibrate(&declared, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(fit.setups.len(), 2);
     assert!(fit.rms.m.expect("lengths").geometric < 1.8 * NOISE);
     // A third place, which the calibration has not seen: only the set-up is found again.

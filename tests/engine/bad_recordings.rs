@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common;
-use kincal::identify::{Fit, Options, calibrate, fit_setup};
+use kincal::identify::{Fit, CalibrateOptions, calibrate, fit_setup};
 use kincal::lie::Vec3;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
@@ -24,7 +24,7 @@ fn machine_of(path: &Path) -> Machine {
 fn error_of(path: &Path) -> Error {
     let machine = machine_of(path);
     Recording::open(path, &machine)
-        .and_then(|r| calibrate(&machine, &[r], Options::default()))
+        .and_then(|r| calibrate(&machine, &[r], CalibrateOptions::default()))
         .map(|_| ())
         .expect_err(&path.display().to_string())
 }
@@ -83,7 +83,7 @@ impl Case {
         let recordings = [Recording::from_bytes("case.csv", text.into_bytes(), &self.machine)
             .unwrap_or_else(|e| panic!("{e}"))];
         let (_, fit) =
-            calibrate(&self.machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
+            calibrate(&self.machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         fit
     }
 }
@@ -148,7 +148,7 @@ fn residuals_above_the_stated_sigma_are_told_once_for_all_recordings() {
     };
     let recordings = [open("one.csv"), open("two.csv")];
     let (_, fit) =
-        calibrate(&case.machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
+        calibrate(&case.machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     assert_warns(&fit, "one.csv, two.csv: residuals are 9.");
     assert_warns(&fit, "times the stated sigma: something besides constant geometry is at work");
     assert_eq!(fit.warnings.iter().filter(|w| w.contains("stated sigma")).count(), 1);
@@ -195,7 +195,7 @@ fn instruments_of_one_kind_with_different_sigma_keep_their_own_noise() {
     };
     let (mut fine, machine) = (fine, coarse.machine.clone());
     let recordings = [with(&mut fine, "1"), with(&mut coarse, "100")];
-    let (_, fit) = calibrate(&machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
+    let (_, fit) = calibrate(&machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     for (recording, sigma) in fit.recordings.iter().zip([1e-6, 1e-4]) {
         assert!((0.9..1.2).contains(&(recording.sigma / sigma)), "{} m, stated {sigma} m", recording.sigma);
         assert!(recording.birge.is_some_and(|b| (0.8..1.2).contains(&b)), "{:?}", recording.birge);
@@ -220,7 +220,7 @@ fn a_ballbar_of_unknown_length_is_found_from_nothing() {
         let recordings = [Recording::from_bytes("bar.csv", case.text().into_bytes(), &case.machine)
             .unwrap_or_else(|e| panic!("{e}"))];
         let (calibrated, fit) =
-            calibrate(&case.machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{e}"));
+            calibrate(&case.machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         let (_, length) = calibrated.lengths().next().expect("a length");
         let rms = fit.rms.m.expect("lengths");
         println!(

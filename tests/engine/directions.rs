@@ -4,7 +4,7 @@ use crate::common;
 use crate::common::random::Random;
 use crate::table::{Axes, Bar, Best, SIGMA, Table, path, record};
 use kincal::feature::Feature;
-use kincal::identify::{Model, Options, calibrate_model};
+use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
 use kincal::lie::Twist;
 use kincal::recording::Recording;
 use kincal::simulate::inverse;
@@ -50,8 +50,8 @@ fn identify(
     samples: Option<u64>,
     error_motions: f64,
 ) -> CalibratedMachine {
-    let model = Model { varying: varying(machine, kind), samples, error_motions, ..Model::default() };
-    calibrate_model(machine, recordings, &model, Options::default(), &|_| {})
+    let model = ErrorModel { varying: varying(machine, kind), samples, error_motions, ..ErrorModel::default() };
+    calibrate_model(machine, recordings, &model, CalibrateOptions::default(), &|_| {})
         .unwrap_or_else(|e| panic!("{e}"))
         .0
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::common;
 use kincal::compensate::{Options, Report, Setup, compensate_text};
-use kincal::diagnose::{Request, diagnose};
+use kincal::diagnose::{DiagnoseOptions, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts, StoredEffect};
 use kincal::predict::predict;
 use kincal::recording::Recording;
@@ -214,7 +214,7 @@ fn a_mill_is_measured_diagnosed_and_its_program_corrected_to_95_percent() {
             library = library.without(name).unwrap_or_else(|e| panic!("{e}"));
         }
     }
-    let request = Request::default();
+    let request = DiagnoseOptions::default();
     let mut diagnosis =
         diagnose(&machine, &recordings, &library, &request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
     let model =

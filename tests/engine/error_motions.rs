@@ -2,8 +2,8 @@
 
 use crate::common;
 use crate::table::{Axes, Bar, Table, path, record};
-use kincal::compensate::{Options as Writing, Setup, compensate_text};
-use kincal::identify::{Model, Options, calibrate_model};
+use kincal::compensate::{CalibrateOptions as Writing, Setup, compensate_text};
+use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
 use kincal::lie::Twist;
 use kincal::predict::predict;
 use kincal::simulate::{At, Plant, Sample};
@@ -20,9 +20,9 @@ fn calibrated(
     let path = path(machine, 0.1, Bar::Machine, None, 180);
     let recording = record(machine, &table, &path, "rec.csv", 8);
     let varying = Varying { directions: Some(Directions::new(vec![axes.a, axes.c])), terms: Vec::new() };
-    let model = Model { varying, error_motions, ..Model::default() };
+    let model = ErrorModel { varying, error_motions, ..ErrorModel::default() };
     let (found, _) =
-        calibrate_model(machine, std::slice::from_ref(&recording), &model, Options::default(), &|_| {})
+        calibrate_model(machine, std::slice::from_ref(&recording), &model, CalibrateOptions::default(), &|_| {})
             .unwrap_or_else(|e| panic!("{e}"));
     (found, path, recording)
 }

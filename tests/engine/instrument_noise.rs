@@ -3,7 +3,7 @@
 use crate::common;
 use crate::common::random::normals;
 use kincal::Machine;
-use kincal::diagnose::{Diagnosis, Request, diagnose};
+use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 use proptest::prelude::*;
@@ -26,7 +26,7 @@ fn recording(machine: &Machine, scale: f64, rho: f64, step: f64, seed: u64) -> R
 fn said(scale: f64, rho: f64, step: f64, seed: u64) -> Result<Diagnosis, TestCaseError> {
     let machine = common::machine("linear_axis");
     let recording = [recording(&machine, scale, rho, step, seed)];
-    let said = diagnose(&machine, &recording, &Library::standard(), &Request::default(), &|_| {});
+    let said = diagnose(&machine, &recording, &Library::standard(), &DiagnoseOptions::default(), &|_| {});
     said.map_err(|e| TestCaseError::fail(e.to_string()))
 }
 

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use crate::common;
 use kincal::compensate::{Options, Setup, compensate_text};
-use kincal::identify::{Model, Options as Fitting, calibrate, calibrate_model};
+use kincal::identify::{ErrorModel, Options as Fitting, calibrate, calibrate_model};
 use kincal::inverse::{Goal, Inverse, Mode};
 use kincal::lie::{Pose, Vec3};
 use kincal::machine::JointKind;

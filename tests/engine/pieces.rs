@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::common;
 use kincal::feature::Feature;
-use kincal::identify::{Loss, Model, Options, calibrate, calibrate_model};
+use kincal::identify::{Loss, ErrorModel, CalibrateOptions, calibrate, calibrate_model};
 use kincal::lie::{Pose, Twist};
 use kincal::predict::predict;
 use kincal::recording::Recording;
@@ -74,8 +74,8 @@ fn open(machine: &Machine, text: &str) -> [Recording; 1] {
     [Recording::from_bytes("rec.csv", text.as_bytes(), machine).unwrap_or_else(|e| panic!("{e}"))]
 }
 
-fn exact() -> Options {
-    Options { loss: Loss::Squares, ..Options::default() }
+fn exact() -> CalibrateOptions {
+    CalibrateOptions { loss: Loss::Squares, ..CalibrateOptions::default() }
 }
 
 /// Adds to the deviation along a joint.
@@ -106,7 +106,7 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
         let varying = Varying { directions: Some(Directions::new(axes.clone())), terms: Vec::new() };
         // Dead bands of nothing: the path is exact.
         let model =
-            Model { varying, dead_bands: vec![Some(0.0); machine.commands().len()], ..Model::default() };
+            ErrorModel { varying, dead_bands: vec![Some(0.0); machine.commands().len()], ..ErrorModel::default() };
         let (calibrated, fit) = calibrate_model(&machine, &recordings, &model, exact(), &|_| {})
             .unwrap_or_else(|e| panic!("{name}: {e}"));
         let (_, plain) = calibrate(&machine, &recordings, exact()).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -183,9 +183,9 @@ fn a_pattern_that_was_never_seen_is_told_and_predicted_from_single_directions() 
     };
     let train = open(&machine, &stated(&|forward| forward != [true, true]));
     let judge = open(&machine, &stated(&|_| true));
-    let model = Model {
+    let model = ErrorModel {
         varying: Varying { directions: Some(Directions::new(vec![a, c])), terms: Vec::new() },
-        ..Model::default()
+        ..ErrorModel::default()
     };
     let (calibrated, fit) =
         calibrate_model(&machine, &train, &model, exact(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
@@ -245,10 +245,10 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
             part(Slot::After(j), behind, Feature::position(j).times(Feature::position(j))),
             part(Slot::Reading, Twist::from_array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), Feature::position(last)),
         ];
-        let model = Model {
+        let model = ErrorModel {
             varying: Varying { directions: None, terms },
             dead_bands: vec![Some(0.0); machine.commands().len()],
-            ..Model::default()
+            ..ErrorModel::default()
         };
         let (_, fit) = calibrate_model(&machine, &recordings, &model, exact(), &|_| {})
             .unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -265,10 +265,10 @@ fn samples_are_picked_evenly_from_every_piece_and_the_others_judge() {
     let machine = common::machine("ac_table_tilting");
     let none = |_: &[f64], _: &[i8]| vec![Twist::zero(0.0); machine.dyads().len()];
     let recordings = open(&machine, &record(&machine, &path(&machine, 1000), &none));
-    let model = Model {
+    let model = ErrorModel {
         varying: Varying { directions: Some(Directions::new(vec![3, 4])), terms: Vec::new() },
         samples: Some(40),
-        ..Model::default()
+        ..ErrorModel::default()
     };
     let (_, fit) =
         calibrate_model(&machine, &recordings, &model, exact(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));

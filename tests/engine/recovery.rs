@@ -1,7 +1,7 @@
 //! Simulate, calibrate, recover: what an identification calls identified lies within four standard errors of the truth.
 
 use crate::common;
-use kincal::identify::{Fit, Loss, Options, Solver, calibrate};
+use kincal::identify::{Fit, Loss, CalibrateOptions, Solver, calibrate};
 use kincal::lie::Vec3;
 use kincal::machine::Tolerance;
 use kincal::predict::predict;
@@ -97,7 +97,7 @@ fn identified_combinations_lie_within_four_standard_errors_for_every_machine_and
             let csv = recording(&truth, &instrument, &commands, &header, seed + 20_000);
             let recordings = [Recording::from_bytes("simulated.csv", csv.into_bytes(), &machine)
                 .unwrap_or_else(|e| panic!("{name}: {e}"))];
-            let (_, fit) = calibrate(&machine, &recordings, Options::default())
+            let (_, fit) = calibrate(&machine, &recordings, CalibrateOptions::default())
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
             let (worst, seen) = worst(&truth, &fit);
             println!(
@@ -132,7 +132,7 @@ fn predictions_at_new_poses_are_as_good_as_the_noise_allows_with_deviations_of_f
             };
             let learnt = [record(&instrument, seed + 2)];
             let (calibrated, fit) =
-                calibrate(&machine, &learnt, Options::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+                calibrate(&machine, &learnt, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
             let noise = instrument.noise.m;
             (instrument.noise.m, instrument.noise.rad) = (0.0, 0.0);
             let new = record(&instrument, seed + 4);
@@ -174,7 +174,7 @@ fn gross_outliers_are_told_and_do_not_bend_the_fit() {
     let bytes = spoilt.join("\n").into_bytes();
     let recordings = [Recording::from_bytes("spoilt.csv", bytes, &machine).unwrap_or_else(|e| panic!("{e}"))];
     for loss in [Loss::Huber { k: 1.345 }, Loss::Tukey { c: 4.685 }, Loss::default()] {
-        let options = Options { loss, ..Options::default() };
+        let options = CalibrateOptions { loss, ..CalibrateOptions::default() };
         let (_, fit) = calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(fit.down_weighted, 6, "{loss:?}");
         assert_eq!(fit.suspects.len(), 6);
@@ -195,7 +195,7 @@ fn the_named_solvers_do_what_their_names_say() {
     let recordings =
         [Recording::from_bytes("d.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))];
     let run =
-        |solver| calibrate(&machine, &recordings, Options { solver, loss: Loss::Squares, prior: false });
+        |solver| calibrate(&machine, &recordings, CalibrateOptions { solver, loss: Loss::Squares, prior: false });
     let rms = |solver| run(solver).map(|(_, fit)| fit.rms.m.expect("lengths").geometric);
     let best = rms(Solver::LevenbergMarquardt).unwrap_or_else(|e| panic!("{e}"));
     // Damping only delays in these directions; truncation at 1e-9 cuts nothing that is seen.
@@ -226,7 +226,7 @@ fn noise_of_clean_data_is_found_the_same_under_every_loss() {
             [Recording::from_bytes("clean.csv", csv.into_bytes(), &machine)
                 .unwrap_or_else(|e| panic!("{e}"))];
         let sigma = |loss: Loss| {
-            let options = Options { loss, ..Options::default() };
+            let options = CalibrateOptions { loss, ..CalibrateOptions::default() };
             calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}")).1.recordings[0].sigma
         };
         let squares = sigma(Loss::Squares);

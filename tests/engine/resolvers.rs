@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::common;
 use crate::common::random::normals;
-use kincal::diagnose::{Diagnosis, Finding, Request, diagnose};
+use kincal::diagnose::{Diagnosis, Finding, DiagnoseOptions, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 use proptest::prelude::*;
@@ -65,7 +65,7 @@ fn diagnosis(resolver: Resolver, seed: u64) -> Result<Diagnosis, TestCaseError> 
     }
     let fail = |e: kincal::Error| TestCaseError::fail(e.to_string());
     let recording = Recording::from_bytes("resolver.csv", text.into_bytes(), &machine).map_err(fail)?;
-    diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {}).map_err(fail)
+    diagnose(&machine, &[recording], &Library::standard(), &DiagnoseOptions::default(), &|_| {}).map_err(fail)
 }
 
 fn draws() -> u32 {

@@ -4,7 +4,7 @@ use crate::common;
 use crate::common::random::Random;
 use kincal::CalibratedMachine;
 use kincal::Machine;
-use kincal::diagnose::{Diagnosis, Request, diagnose};
+use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
 use kincal::feature::{Binding, Expression, Feature, as_seen_in, samples_of};
 use kincal::predict::predict;
@@ -193,7 +193,7 @@ fn twisted(with_left: bool) -> (Machine, Recording) {
 
 fn diagnosed(with_left: bool) -> Diagnosis {
     let (machine, recording) = twisted(with_left);
-    let said = diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {});
+    let said = diagnose(&machine, &[recording], &Library::standard(), &DiagnoseOptions::default(), &|_| {});
     said.unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -3,9 +3,9 @@
 use crate::common;
 use crate::common::random::normals;
 use kincal::CalibratedMachine;
-use kincal::diagnose::{Request, diagnose};
+use kincal::diagnose::{DiagnoseOptions, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
-use kincal::identify::Options;
+use kincal::identify::CalibrateOptions;
 use kincal::predict::predict;
 use kincal::recording::Recording;
 
@@ -80,7 +80,7 @@ fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_
             recording("moves.csv", 0.0, true, None, Some(&moved)),
             recording("rests.csv", 20.0, false, None, Some(&rested)),
         ];
-        let mut said = diagnose(&machine, &known, &library, &Request::default(), &|_| {})
+        let mut said = diagnose(&machine, &known, &library, &DiagnoseOptions::default(), &|_| {})
             .unwrap_or_else(|e| panic!("{e}"));
         let names: Vec<(&str, &str)> =
             said.findings.iter().map(|f| (f.effect.as_str(), f.at.as_str())).collect();
@@ -91,7 +91,7 @@ fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_
 
         // But for a sample or two in the dead band at each reversal the model is as good as the noise; what it foretells of that recording needs to be told the side.
         let model =
-            said.model(&machine, &known, Options::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+            said.model(&machine, &known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
         let noise = 3f64.sqrt() * 1e-6;
         let last = said.rms.m.expect("lengths").r#final;
         assert!((0.95 * noise..1.15 * noise).contains(&last), "{last}");

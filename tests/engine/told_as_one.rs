@@ -4,14 +4,14 @@ use std::f64::consts::TAU;
 
 use crate::common;
 use crate::common::random::normals;
-use kincal::diagnose::{Diagnosis, Request, diagnose};
+use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 
 fn said_of(text: String) -> Diagnosis {
     let machine = common::machine("rotary_axis");
     let recording = Recording::from_bytes("c.csv", text.into_bytes(), &machine).expect("a recording");
-    diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {})
+    diagnose(&machine, &[recording], &Library::standard(), &DiagnoseOptions::default(), &|_| {})
         .unwrap_or_else(|e| panic!("{e}"))
 }
 

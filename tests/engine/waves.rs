@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::common;
 use crate::common::random::normals;
-use kincal::diagnose::{Request, diagnose};
+use kincal::diagnose::{DiagnoseOptions, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 use proptest::prelude::*;
@@ -47,7 +47,7 @@ fn recording(machine: &kincal::Machine, period: f64, phase: f64, seed: u64) -> R
 
 /// That one cyclic error of 2 um is found in it, of this period in mm, and nothing else.
 fn is_told(machine: &kincal::Machine, recording: Recording, period: f64) -> Result<(), TestCaseError> {
-    let said = diagnose(machine, &[recording], &Library::standard(), &Request::default(), &|_| {});
+    let said = diagnose(machine, &[recording], &Library::standard(), &DiagnoseOptions::default(), &|_| {});
     let said = said.map_err(|e| TestCaseError::fail(e.to_string()))?;
     let names: Vec<_> = said.findings.iter().map(|f| (f.effect.as_str(), f.at.as_str())).collect();
     prop_assert_eq!(&names, &[("cyclic_error", "x")]);
@@ -81,7 +81,7 @@ fn periods_are_off_by_as_much_as_is_said() {
     let off = |k: u32| {
         let period = 6.0 + 0.731 * f64::from(k);
         let recording = recording(&machine, period, 0.9 * f64::from(k), 77 + 13 * u64::from(k));
-        let said = diagnose(&machine, &[recording], &Library::standard(), &Request::default(), &|_| {});
+        let said = diagnose(&machine, &[recording], &Library::standard(), &DiagnoseOptions::default(), &|_| {});
         let said = said.unwrap_or_else(|e| panic!("{e}"));
         let [finding] = &said.findings[..] else { panic!("{period} mm: {:?}", said.findings) };
         let found = finding.coefficients.iter().find(|c| c.name == "period").expect("a period");

@@ -2,7 +2,7 @@
 
 use crate::common;
 use kincal::CalibratedMachine;
-use kincal::identify::{Options, calibrate, reach};
+use kincal::identify::{CalibrateOptions, calibrate, reach};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
@@ -19,7 +19,7 @@ fn calibrated_file_of_every_machine_comes_back_and_predicts_the_same() {
         let recordings = [Recording::from_bytes("r.csv", csv.into_bytes(), &machine)
             .unwrap_or_else(|e| panic!("{name}: {e}"))];
         let (calibrated, fit) =
-            calibrate(&machine, &recordings, Options::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            calibrate(&machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
         let text = calibrated.to_ron();
         let again = CalibratedMachine::parse("again.ron", &text).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(again.machine(), calibrated.machine(), "{name}");
@@ -50,7 +50,7 @@ fn poses_beyond_what_was_seen_are_counted() {
         Recording::from_bytes("r.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))
     };
     let (calibrated, _) =
-        calibrate(&machine, &[open(&narrow)], Options::default()).unwrap_or_else(|e| panic!("{e}"));
+        calibrate(&machine, &[open(&narrow)], CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     let inside = predict(&calibrated, &open(&narrow), None).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(inside.extrapolated_samples, 0);
     let outside = predict(&calibrated, &open(&commands), None).unwrap_or_else(|e| panic!("{e}"));

@@ -1,9 +1,9 @@
 //! The report of a diagnosis: one HTML file that needs nothing else.
 
-use kincal::diagnose::{Along, Curve, CurvePoint, Diagnosis, Finding, Size, Trace};
-use kincal::effects::in_words;
-use kincal::feature::Dimension;
-use kincal::location::LocationErrors;
+use crate::diagnose::{Along, Curve, CurvePoint, Diagnosis, Finding, Size, Trace};
+use crate::effects::in_words;
+use crate::feature::Dimension;
+use crate::location::LocationErrors;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::plot::{AFTER, BACKWARD, BEFORE, CURVE, FORWARD, Layer, Marks, NEITHER, Plot, envelope, thinned};

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
-use kincal::diagnose::{
+use crate::diagnose::{
     Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, SaidBy,
     StandsStill, Unexplained, UnseenSideBranch, Where,
 };
-use kincal::effects::in_words;
-use kincal::feature::Dimension;
+use crate::effects::in_words;
+use crate::feature::Dimension;
 
 use crate::cli::output::{count, decimals, length};
 

@@ -1,8 +1,8 @@
 //! Numbers with their units as the command line takes them: `100mm`, `1000mm/min`, `uniform:10um`, `0,0,50mm`.
 
-use kincal::lie::Vec3;
-use kincal::simulate::Scatter;
-use kincal::units::{Quantity, Unit, amount};
+use crate::lie::Vec3;
+use crate::simulate::Scatter;
+use crate::units::{Quantity, Unit, amount};
 
 pub(crate) fn length(text: &str) -> Result<f64, String> {
     amount(text, Quantity::Length)
@@ -166,7 +166,7 @@ pub(crate) fn held(text: &str) -> Result<Held, String> {
 }
 
 /// `mm,deg`: a unit of length and one of angle.
-pub(crate) fn units(text: &str) -> Result<kincal::machine::FileUnits, String> {
+pub(crate) fn units(text: &str) -> Result<crate::machine::FileUnits, String> {
     let find = |symbol: &str, quantity| {
         let unit = Unit::named(symbol.trim()).filter(|unit| unit.quantity == quantity);
         unit.ok_or_else(|| {
@@ -178,7 +178,7 @@ pub(crate) fn units(text: &str) -> Result<kincal::machine::FileUnits, String> {
         })
     };
     let (length, angle) = text.split_once(',').ok_or("write a unit of length and one of angle: mm,deg")?;
-    Ok(kincal::machine::FileUnits {
+    Ok(crate::machine::FileUnits {
         length: find(length, Quantity::Length)?,
         angle: find(angle, Quantity::Angle)?,
     })

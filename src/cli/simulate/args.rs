@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use kincal::lie::Vec3;
-use kincal::machine::FileUnits;
-use kincal::simulate::Scatter;
+use crate::lie::Vec3;
+use crate::machine::FileUnits;
+use crate::simulate::Scatter;
 
 use super::amounts::{self as amounts, Held, Rate};
 use crate::cli::Common;

@@ -1,15 +1,15 @@
 //! From options to a plant and its runs.
 
-use kincal::CalibratedMachine;
-use kincal::lie::{Pose, Twist, Vec3};
-use kincal::machine::{JointKind, Machine};
-use kincal::sensor::Sensor;
-use kincal::simulate::{
+use crate::calibration::CalibratedMachine;
+use crate::lie::{Pose, Twist, Vec3};
+use crate::machine::{JointKind, Machine};
+use crate::sensor::Sensor;
+use crate::simulate::{
     Balls, Claims, CommandTable, Course, Drive, Family, Faults, Figure, Instrument, Pace, PartProgram, Plant,
     Pointing, RandomPoses, Rounding, Run, Sense as Turn, Standard, Turning, Turns, plane_across,
     plane_of_axes, rest, usual_range,
 };
-use kincal::units::{Quantity, amount};
+use crate::units::{Quantity, amount};
 
 use super::amounts::Rate;
 use super::args::{Args, BarDirection, Measure, OnOff, Sense, Sort, Test};

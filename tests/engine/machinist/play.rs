@@ -56,7 +56,7 @@ fn with_play(machine: &Machine, rotary: &[usize], seed: u64) -> (Plant, Vec<Stri
     let model = Model {
         varying: Varying { directions: Some(Directions::new(rotary.to_vec())), terms: Vec::new() },
         dead_bands: vec![Some(1e-7); 5],
-        ..Model::default()
+        ..ErrorModel::default()
     };
     let (pieces, _) = calibrate_model(machine, &[measured], &model, Fitting::default(), &|_| {})
         .unwrap_or_else(|e| panic!("{e}"));

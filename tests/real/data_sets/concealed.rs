@@ -5,7 +5,7 @@
 #![allow(dead_code)]
 
 use kincal::Machine;
-use kincal::diagnose::{Diagnosis, Request, diagnose};
+use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 
@@ -161,7 +161,7 @@ impl Set {
     }
 
     pub fn diagnosis(&self, recordings: &[Recording]) -> Diagnosis {
-        diagnose(&self.machine, recordings, &Library::standard(), &Request::default(), &|_| ())
+        diagnose(&self.machine, recordings, &Library::standard(), &DiagnoseOptions::default(), &|_| ())
             .unwrap_or_else(|e| panic!("{}: {e}", self.name))
     }
 }

@@ -1,6 +1,6 @@
 //! Constant geometry, learnt from a part of a set and judged on the rest.
 
-use kincal::identify::{Options, calibrate, fit_setup};
+use kincal::identify::{CalibrateOptions, calibrate, fit_setup};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::{CalibratedMachine, Machine};
@@ -17,7 +17,7 @@ fn rms(calibrated: &CalibratedMachine, recordings: &[Recording]) -> (f64, u64) {
 }
 
 /// Cross-validation of a set with a machine, which may differ from the set's own in its tolerances.
-pub fn cross_validate(set: &Set, folds: &[Fold], machine: &Machine, options: Options) -> (f64, f64) {
+pub fn cross_validate(set: &Set, folds: &[Fold], machine: &Machine, options: CalibrateOptions) -> (f64, f64) {
     let nominal = CalibratedMachine::nominal(machine.clone());
     let (mut before, mut after, mut samples) = (0.0, 0.0, 0);
     for fold in folds {

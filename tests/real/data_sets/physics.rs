@@ -4,7 +4,7 @@
 //! `cargo run --release --example measure -- terms SET TERMS` fits a set with other effects.
 
 use kincal::effects::Library;
-use kincal::identify::{Model, Options, calibrate_model};
+use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
 use kincal::variation::Varying;
 
 use super::sets::{SETS, Set};
@@ -78,8 +78,8 @@ fn asked_of(name: &str) -> &'static str {
 fn coefficients(name: &str, asked: &str) -> Vec<f64> {
     let set = set(name);
     let (varying, _) = terms(set, &Library::standard(), asked);
-    let model = Model { varying, ..Model::default() };
-    let found = calibrate_model(&set.machine, &set.whole(), &model, Options::default(), &|_| {});
+    let model = ErrorModel { varying, ..ErrorModel::default() };
+    let found = calibrate_model(&set.machine, &set.whole(), &model, CalibrateOptions::default(), &|_| {});
     let (_, fit) = found.unwrap_or_else(|e| panic!("{e}"));
     fit.coefficients.iter().map(|c| c.value).collect()
 }

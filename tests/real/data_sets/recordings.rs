@@ -3,7 +3,7 @@
 //! `cargo test --release --test real recordings -- --ignored --nocapture` prints the figures of `docs/accuracy.md`;
 //! `cargo run --release --example measure -- losses` and `-- tolerances` how losses and tolerances compare.
 
-use kincal::identify::{Options, calibrate};
+use kincal::identify::{CalibrateOptions, calibrate};
 
 use super::left_out::cross_validate;
 use super::sets::{Set, fanuc, gen3_lites, hilti, justin, kuka, pandas};
@@ -17,7 +17,7 @@ struct Figures {
     held_out: f64,
 }
 
-fn figures(set: &Set, options: Options) -> Figures {
+fn figures(set: &Set, options: CalibrateOptions) -> Figures {
     let (_, fit) =
         calibrate(&set.machine, &set.whole(), options).unwrap_or_else(|e| panic!("{}: {e}", set.name));
     let all = fit.rms.m.expect("positions");
@@ -57,7 +57,7 @@ fn reaches(sets: impl IntoIterator<Item = Set>, limits: &[(&'static str, f64, f6
     };
     let mut missed = Vec::new();
     for set in sets {
-        let (found, limit) = (figures(&set, Options::default()), limit(&set.name));
+        let (found, limit) = (figures(&set, CalibrateOptions::default()), limit(&set.name));
         let mut check = |what: &str, value: f64, limit_mm: f64| {
             if value.is_nan() || value > limit_mm {
                 missed.push(format!("{} {what}: {value:.3} mm, expected {limit_mm} mm at most", limit.set));

@@ -1,6 +1,6 @@
 //! A humanoid whose left arm is heavy for the joints that carry its right one.
 
-use kincal::diagnose::{Request, diagnose};
+use kincal::diagnose::{DiagnoseOptions, diagnose};
 use kincal::effects::Library;
 use kincal::predict::predict;
 
@@ -15,7 +15,7 @@ fn with_the_joints_of_both_arms_a_humanoid_is_foretold_on_rows_left_out() {
         .iter()
         .flat_map(|set| set.folds().into_iter().take(folds).map(move |fold| (set, fold)))
     {
-        let (library, request) = (Library::standard(), Request::default());
+        let (library, request) = (Library::standard(), DiagnoseOptions::default());
         let mut said = diagnose(&set.machine, &fold.train, &library, &request, &|_| {})
             .unwrap_or_else(|e| panic!("{}: {e}", set.name));
         let names: Vec<_> = said.findings.iter().map(|f| (f.effect.as_str(), f.at.as_str())).collect();

@@ -6,7 +6,7 @@
 use kincal::CalibratedMachine;
 use kincal::effects::{Candidate, Library, RecordingFacts};
 use kincal::feature::samples_of;
-use kincal::identify::{Model, Options, calibrate_model, fit_setup};
+use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model, fit_setup};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::variation::{Part, Term, Varying};
@@ -118,9 +118,9 @@ pub struct Figures {
 
 /// Calibrates a set with these terms, on all rows and on each part in turn.
 pub fn figures(set: &Set, varying: &Varying, names: &[String]) -> Figures {
-    let model = Model { varying: varying.clone(), ..Model::default() };
+    let model = ErrorModel { varying: varying.clone(), ..ErrorModel::default() };
     let calibrated = |recordings: &[Recording]| {
-        calibrate_model(&set.machine, recordings, &model, Options::default(), &|_| {})
+        calibrate_model(&set.machine, recordings, &model, CalibrateOptions::default(), &|_| {})
             .unwrap_or_else(|e| panic!("{}: {e}", set.name))
     };
     let whole = || {
@@ -132,7 +132,7 @@ pub fn figures(set: &Set, varying: &Varying, names: &[String]) -> Figures {
         let one = |fold: Fold| {
             let (mut learnt, _) = calibrated(&fold.train);
             if !fold.setup.is_empty() {
-                learnt = fit_setup(&learnt, &fold.setup, Options::default().loss)
+                learnt = fit_setup(&learnt, &fold.setup, CalibrateOptions::default().loss)
                     .unwrap_or_else(|e| panic!("{e}"));
             }
             squares(&learnt, &fold.test)
