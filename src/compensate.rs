@@ -28,21 +28,72 @@
 //! # Ok::<(), kincal::Error>(())
 //! ```
 
-mod arc;
-mod calls;
-mod control;
-mod correct;
-mod effects;
+// In the order in which they are imported, earliest first; a paragraph is a layer whose files do not import each other.
+
+// What is asked for and told.
 mod fault;
-mod follower;
-mod frame;
-mod model;
+mod options;
 mod report;
 mod setup;
-mod straight;
-mod target;
+
+// What is wrong with the machine.
+mod model;
+
+mod pieces;
+
+mod effects;
+
+mod calibrated;
+
+// What a block says.
+mod axis;
+mod code;
+mod event;
+mod motion_word;
+mod output;
+mod position;
+mod refusal;
+
+mod call;
+
+// The program as its control follows it.
+mod frame;
+mod places;
 mod tool;
+
+mod control;
+
+mod target;
 mod ways;
+
+mod interpreter;
+
+mod arc;
+
+// The correction of a position.
+mod style;
+mod tip_error;
+mod unseen;
+
+mod corrector;
+
+mod words;
+
+// The program as it is written.
+mod pass;
+
+mod lines;
+
+mod cycle;
+mod straight;
+
+mod curve;
+
+// What goes over a whole program.
+mod subprograms;
+
+mod scout;
+mod writer;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -50,6 +101,7 @@ use std::path::Path;
 
 pub use fault::CompensateFault;
 pub use model::Model;
+pub use options::Options;
 pub use report::{
     Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, UnknownWay, Unreached, Unseen,
     UnseenPattern, Worst,
@@ -58,32 +110,14 @@ pub use setup::{Setup, ToolAxis};
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
-use crate::inverse::Mode;
 use crate::machine::Machine;
-use crate::nc::{Dialect, Program, State};
-use calls::{Bounds, Calls};
-use follower::{Follower, put};
-
-/// How to write.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Options {
-    /// Digits behind the point; without, the most that the program itself has, but 3 (4 in inch) at least.
-    pub decimals: Option<usize>,
-    /// Tolerance within which arcs become lines, m; without, an arc that the errors deform is refused.
-    pub arcs: Option<f64>,
-    /// Largest error of the tip that a straight move may leave between its ends, m; without, moves stay
-    /// whole.
-    pub split: Option<f64>,
-    /// What counts, where it is not what the machine has joints for.
-    pub mode: Option<Mode>,
-    /// The dialect, where it is not to be taken from the program.
-    pub dialect: Option<Dialect>,
-}
-
-/// A name without quotes.
-pub(crate) fn named(name: &str) -> String {
-    name.trim().trim_matches('"').to_string()
-}
+use crate::nc::{Program, State};
+use calibrated::model_of;
+use interpreter::Interpreter;
+use output::put;
+use scout::Scout;
+use subprograms::{Bounds, Follow, SubPrograms};
+use writer::Writer;
 
 /// Corrects the program `path` and writes it to `out`. Memory does not grow with the program, sub-programs
 /// aside.
@@ -103,7 +137,7 @@ pub fn compensate(
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
         Program::new(path, BufReader::new(file))
     };
-    let mut model = model::of_machine(calibrated);
+    let mut model = model_of(calibrated);
     run(calibrated.machine(), &mut *model, &open, setup, options, out)
 }
 
@@ -118,7 +152,7 @@ pub fn compensate_text(
     setup: &Setup,
     options: &Options,
 ) -> Result<(String, Report)> {
-    let mut model = model::of_machine(calibrated);
+    let mut model = model_of(calibrated);
     let machine = calibrated.machine();
     let (bytes, report) = compensate_with(machine, &mut *model, file, text.as_ref(), setup, options)?;
     Ok((String::from_utf8_lossy(&bytes).into_owned(), report))
@@ -163,7 +197,7 @@ fn run<R: BufRead>(
         return copy(machine, &mut open()?, out);
     }
     let mut program = open()?;
-    let mut calls = Calls::default();
+    let mut calls = SubPrograms::default();
     let dialect = program.dialect();
     let mut bounds = Bounds::default();
     while let Some(block) = program.next_block()? {
@@ -171,33 +205,34 @@ fn run<R: BufRead>(
             calls.add(&name, &block);
         }
     }
+    let start = Interpreter::new(machine, setup, dialect);
     let mut first = vec![0; machine.commands().len()];
     if !model.keyed().is_empty() {
-        let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
-        follower.scouting = true;
+        let mut scout = Scout::new(start.clone(), model);
         // What is wrong with the program is told when it is corrected.
-        let _ = follow(&mut follower, &mut open()?, &mut calls, &mut std::io::sink());
-        first = follower.ways.first;
+        let _ = follow(&mut scout, &mut open()?, &mut calls, &mut std::io::sink(), Scout::has_found);
+        first = scout.finish();
     }
     if !calls.is_empty() {
-        calls.collecting = true;
-        let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
-        follow(&mut follower, &mut open()?, &mut calls, &mut std::io::sink())?;
-        calls.collecting = false;
+        calls.collect(true);
+        let mut writer = Writer::new(start.clone(), model, options, &first);
+        follow(&mut writer, &mut open()?, &mut calls, &mut std::io::sink(), |_| false)?;
+        calls.collect(false);
     }
-    let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
-    let blocks = follow(&mut follower, &mut open()?, &mut calls, out)?;
-    let mut report = follower.finish();
+    let mut writer = Writer::new(start, model, options, &first);
+    let blocks = follow(&mut writer, &mut open()?, &mut calls, out, |_| false)?;
+    let mut report = writer.finish();
     report.blocks = blocks;
     Ok(report)
 }
 
-/// One pass; how many blocks there are.
-fn follow<R: BufRead>(
-    follower: &mut Follower,
+/// One pass, to the end or as far as it is `done`; how many blocks there are.
+fn follow<'a, F: Follow<'a>, R: BufRead>(
+    follower: &mut F,
     program: &mut Program<R>,
-    calls: &mut Calls,
+    calls: &mut SubPrograms,
     out: &mut dyn Write,
+    done: impl Fn(&F) -> bool,
 ) -> Result<u64> {
     let dialect = program.dialect();
     let mut bounds = Bounds::default();
@@ -209,7 +244,7 @@ fn follow<R: BufRead>(
         } else {
             calls.block(follower, &mut block, 0, out)?;
         }
-        if follower.scouting && follower.ways.found(follower.model) {
+        if done(follower) {
             break;
         }
     }
