@@ -5,7 +5,7 @@
 //! program's own numbers stood, every other byte as it was. `docs/compensate.md`.
 //!
 //! ```
-//! use kincal::compensate::{Options, Setup, compensate_text};
+//! use kincal::compensate::{CompensateOptions, Setup, compensate_text};
 //! use kincal::lie::Twist;
 //! use kincal::{CalibratedMachine, Machine};
 //!
@@ -22,28 +22,79 @@
 //! let calibrated = CalibratedMachine::nominal(machine).with_deviations(deviations);
 //! let program = "G1 X0. Y0. Z0. F900 (corner)\nY100.\n";
 //! let (text, report) =
-//!     compensate_text(&calibrated, "part.nc", program, &Setup::default(), &Options::default())?;
+//!     compensate_text(&calibrated, "part.nc", program, &Setup::default(), &CompensateOptions::default())?;
 //! assert_eq!(text, "G1 X0. Y0. Z0. F900 (corner)\nX0.1 Y100.\n");
 //! assert_eq!(report.inserted_words, 1);
 //! # Ok::<(), kincal::Error>(())
 //! ```
 
-mod arc;
-mod calls;
-mod control;
-mod correct;
-mod effects;
+// In the order in which they are imported, earliest first; a paragraph is a layer whose files do not import each other.
+
+// What is asked for and told.
 mod fault;
-mod follower;
-mod frame;
-mod gaps;
-mod model;
+mod options;
 mod report;
 mod setup;
-mod straight;
-mod target;
+
+// What is wrong with the machine.
+mod model;
+
+mod pieces;
+
+mod effects;
+
+mod calibrated;
+
+// What a block says.
+mod axis;
+mod code;
+mod event;
+mod motion_word;
+mod output;
+mod position;
+mod refusal;
+
+mod call;
+
+// The program as its control follows it.
+mod frame;
+mod places;
 mod tool;
+
+mod control;
+
+mod target;
 mod ways;
+
+mod interpreter;
+
+mod arc;
+
+// The correction of a position.
+mod style;
+mod tip_error;
+mod unseen;
+
+mod corrector;
+
+mod words;
+
+// The program as it is written.
+mod pass;
+
+mod lines;
+
+mod cycle;
+mod straight;
+
+mod curve;
+
+// What goes over a whole program.
+mod subprograms;
+
+mod gaps;
+mod scout;
+mod writer;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -51,6 +102,7 @@ use std::path::Path;
 
 pub use fault::CompensateFault;
 pub use model::Model;
+pub use options::CompensateOptions;
 pub use report::{
     Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, UnknownWay, Unreached, Unseen,
     UnseenPattern, Worst,
@@ -59,33 +111,15 @@ pub use setup::{Setup, ToolAxis};
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
-use crate::inverse::Mode;
 use crate::machine::Machine;
-use crate::nc::{Dialect, Program, State};
-use calls::{Bounds, Calls};
-use follower::{Follower, put};
-use gaps::Gaps;
-
-/// How to write.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Options {
-    /// Digits behind the point; without, the most that the program itself has, but 3 (4 in inch) at least.
-    pub decimals: Option<usize>,
-    /// Tolerance within which arcs become lines, m; without, an arc that the errors deform is refused.
-    pub arcs: Option<f64>,
-    /// Largest error of the tip that a straight move may leave between its ends, m; without, moves stay
-    /// whole.
-    pub split: Option<f64>,
-    /// What counts, where it is not what the machine has joints for.
-    pub mode: Option<Mode>,
-    /// The dialect, where it is not to be taken from the program.
-    pub dialect: Option<Dialect>,
-}
-
-/// A name without quotes.
-pub(crate) fn named(name: &str) -> String {
-    name.trim().trim_matches('"').to_string()
-}
+use crate::nc::{Program, State};
+use calibrated::model_of;
+use gaps::{Gaps, is_gap};
+use interpreter::Interpreter;
+use output::put;
+use scout::Scout;
+use subprograms::{Bounds, Follow, SubPrograms};
+use writer::Writer;
 
 /// Corrects the program `path` and writes it to `out`. Memory does not grow with the program, sub-programs
 /// aside.
@@ -97,7 +131,7 @@ pub fn compensate(
     calibrated: &CalibratedMachine,
     path: impl AsRef<Path>,
     setup: &Setup,
-    options: &Options,
+    options: &CompensateOptions,
     out: &mut dyn Write,
 ) -> Result<Report> {
     let path = path.as_ref();
@@ -105,7 +139,7 @@ pub fn compensate(
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
         Program::new(path, BufReader::new(file))
     };
-    let mut model = model::of_machine(calibrated);
+    let mut model = model_of(calibrated);
     run(calibrated.machine(), &mut *model, &open, setup, options, out)
 }
 
@@ -118,9 +152,9 @@ pub fn compensate_text(
     file: impl AsRef<Path>,
     text: impl AsRef<[u8]>,
     setup: &Setup,
-    options: &Options,
+    options: &CompensateOptions,
 ) -> Result<(String, Report)> {
-    let mut model = model::of_machine(calibrated);
+    let mut model = model_of(calibrated);
     let machine = calibrated.machine();
     let (bytes, report) = compensate_with(machine, &mut *model, file, text.as_ref(), setup, options)?;
     Ok((String::from_utf8_lossy(&bytes).into_owned(), report))
@@ -136,7 +170,7 @@ pub fn compensate_with(
     file: impl AsRef<Path>,
     text: &[u8],
     setup: &Setup,
-    options: &Options,
+    options: &CompensateOptions,
 ) -> Result<(Vec<u8>, Report)> {
     let mut out = Vec::with_capacity(text.len() + text.len() / 4);
     let open = || Program::new(file.as_ref(), text);
@@ -151,7 +185,7 @@ fn run<R: BufRead>(
     model: &mut dyn Model,
     open: &dyn Fn() -> Result<Program<R>>,
     setup: &Setup,
-    options: &Options,
+    options: &CompensateOptions,
     out: &mut dyn Write,
 ) -> Result<Report> {
     let open = || {
@@ -165,8 +199,8 @@ fn run<R: BufRead>(
         return copy(machine, &mut open()?, out);
     }
     match correct(machine, model, &open, setup, options, out) {
-        Err(error) if error.fault().is_some_and(Gaps::is_one) => {
-            let all = gaps(machine, model, &open, setup, options)?.together();
+        Err(error) if error.fault().is_some_and(is_gap) => {
+            let all = gaps(machine, &open, setup)?.together();
             Err(match (error.place(), all) {
                 (Some(place), Some(all)) => Error::input(place.clone(), all),
                 _ => error,
@@ -182,36 +216,36 @@ fn correct<R: BufRead>(
     model: &mut dyn Model,
     open: &dyn Fn() -> Result<Program<R>>,
     setup: &Setup,
-    options: &Options,
+    options: &CompensateOptions,
     out: &mut dyn Write,
 ) -> Result<Report> {
     let mut program = open()?;
     let dialect = program.dialect();
     let mut calls = sub_programs(&mut program)?;
+    let start = Interpreter::new(machine, setup, dialect);
     let mut first = vec![0; machine.commands().len()];
     if !model.keyed().is_empty() {
-        let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
-        follower.scouting = true;
+        let mut scout = Scout::new(start.clone(), model);
         // What is wrong with the program is told when it is corrected.
-        let _ = follow(&mut follower, &mut open()?, &mut calls, &mut std::io::sink());
-        first = follower.ways.first;
+        let _ = follow(&mut scout, &mut open()?, &mut calls, &mut std::io::sink(), Scout::has_found);
+        first = scout.finish();
     }
     if !calls.is_empty() {
-        calls.collecting = true;
-        let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
-        follow(&mut follower, &mut open()?, &mut calls, &mut std::io::sink())?;
-        calls.collecting = false;
+        calls.collect(true);
+        let mut writer = Writer::new(start.clone(), model, options, &first);
+        follow(&mut writer, &mut open()?, &mut calls, &mut std::io::sink(), |_| false)?;
+        calls.collect(false);
     }
-    let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
-    let blocks = follow(&mut follower, &mut open()?, &mut calls, out)?;
-    let mut report = follower.finish();
+    let mut writer = Writer::new(start, model, options, &first);
+    let blocks = follow(&mut writer, &mut open()?, &mut calls, out, |_| false)?;
+    let mut report = writer.finish();
     report.blocks = blocks;
     Ok(report)
 }
 
 /// The sub-programs of a file.
-fn sub_programs<R: BufRead>(program: &mut Program<R>) -> Result<Calls> {
-    let (dialect, mut bounds, mut calls) = (program.dialect(), Bounds::default(), Calls::default());
+fn sub_programs<R: BufRead>(program: &mut Program<R>) -> Result<SubPrograms> {
+    let (dialect, mut bounds, mut calls) = (program.dialect(), Bounds::default(), SubPrograms::default());
     while let Some(block) = program.next_block()? {
         if let Some(name) = bounds.of(&block, dialect) {
             calls.add(&name, &block);
@@ -221,34 +255,25 @@ fn sub_programs<R: BufRead>(program: &mut Program<R>) -> Result<Calls> {
 }
 
 /// All that the program needs of the set-up and the set-up does not say.
-fn gaps<R: BufRead>(
-    machine: &Machine,
-    model: &mut dyn Model,
+fn gaps<'a, R: BufRead>(
+    machine: &'a Machine,
     open: &dyn Fn() -> Result<Program<R>>,
-    setup: &Setup,
-    options: &Options,
-) -> Result<Gaps> {
-    let mut calls = sub_programs(&mut open()?)?;
+    setup: &'a Setup,
+) -> Result<Gaps<'a>> {
     let mut program = open()?;
-    let (dialect, mut bounds) = (program.dialect(), Bounds::default());
-    let first = vec![0; machine.commands().len()];
-    let mut follower = Follower::new(machine, model, setup, options, dialect, &first);
-    follower.gaps = Some(Gaps::default());
-    while let Some(mut block) = program.next_block()? {
-        if bounds.of(&block, dialect).is_none() {
-            // Whatever else is wrong with a block is told once the set-up is complete.
-            let _ = calls.block(&mut follower, &mut block, 0, &mut std::io::sink());
-        }
-    }
-    Ok(follower.gaps.unwrap_or_default())
+    let mut gaps = Gaps::new(Interpreter::new(machine, setup, program.dialect()));
+    let mut calls = sub_programs(&mut program)?;
+    follow(&mut gaps, &mut open()?, &mut calls, &mut std::io::sink(), |_| false)?;
+    Ok(gaps)
 }
 
-/// One pass; how many blocks there are.
-fn follow<R: BufRead>(
-    follower: &mut Follower,
+/// One pass, to the end or as far as it is `done`; how many blocks there are.
+fn follow<'a, F: Follow<'a>, R: BufRead>(
+    follower: &mut F,
     program: &mut Program<R>,
-    calls: &mut Calls,
+    calls: &mut SubPrograms,
     out: &mut dyn Write,
+    done: impl Fn(&F) -> bool,
 ) -> Result<u64> {
     let dialect = program.dialect();
     let mut bounds = Bounds::default();
@@ -260,7 +285,7 @@ fn follow<R: BufRead>(
         } else {
             calls.block(follower, &mut block, 0, out)?;
         }
-        if follower.scouting && follower.ways.found(follower.model) {
+        if done(follower) {
             break;
         }
     }

@@ -31,23 +31,44 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod block;
-mod codes;
-mod cut;
+// In the order in which they are imported, earliest first; a paragraph is a layer whose files do not import each other.
+
 mod dialect;
-mod effects;
 mod fault;
 mod modes;
+mod token;
+
+// A line and its pieces.
+mod codes;
 mod number;
-mod program;
-mod state;
+
+mod line;
 mod words;
 
-pub use block::{Block, Kind, Token};
+mod cut;
+
+mod block;
+
+// A program as a stream of lines.
+mod signature;
+
+mod program;
+
+// What stays in force from block to block.
+mod axes;
+mod motion;
+
+mod effects;
+
+mod state;
+
+pub use block::Block;
 pub use dialect::Dialect;
 pub use fault::NcFault;
 pub use modes::{Coordinate, Distance, Feed, Modes, MotionKind, Plane, Units, Why};
+pub use motion::{Motion, Step};
 pub use number::Number;
 pub use program::{LONGEST_LINE, Program};
-pub use state::{Motion, State, Step};
+pub use state::State;
+pub use token::{Kind, Token};
 pub use words::{How, Value, Word};

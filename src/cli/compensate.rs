@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
-use crate::compensate::{Listed, Options, Report, Setup, UnknownWay, Worst, compensate};
+use crate::compensate::{Listed, CompensateOptions, Report, Setup, UnknownWay, Worst, compensate};
 use crate::inverse::Mode;
 use crate::nc::Dialect;
 use crate::units::{Quantity, Unit};
@@ -95,7 +95,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let setup = args.setup.as_ref().map_or(Ok(Setup::default()), Setup::open)?;
-    let options = Options {
+    let options = CompensateOptions {
         decimals: args.decimals.map(usize::from),
         arcs: args.arcs,
         split: args.split,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::follower::{Follower, Status};
+use super::interpreter::Interpreter;
 use crate::nc::{Block, Dialect, How, Motion, MotionKind, Plane, Value};
 
 /// An arc in program coordinates, m and rad.
@@ -19,16 +19,10 @@ pub(super) struct Arc {
 }
 
 impl Arc {
-    /// Reads an arc out of its block; what is wrong with it in words.
-    pub fn of(
-        follower: &Follower,
-        block: &Block,
-        motion: &Motion,
-        start: &[f64],
-        end: &[f64],
-    ) -> Result<Arc, String> {
-        let modes = follower.state.modes();
-        let control = &follower.control;
+    /// Reads an arc out of its block, from where the program means to be to `end`; what is wrong with it in words.
+    pub fn of(program: &Interpreter, block: &Block, motion: &Motion, end: &[f64]) -> Result<Arc, String> {
+        let (modes, control, dialect) = (program.modes(), program.control(), program.dialect());
+        let start = program.meant().program();
         // First and second axis of the plane, in the sense in which G3 turns, and the letters of the centre.
         let (names, centres) = match modes.plane {
             None | Some(Plane::Xy) => (["X", "Y"], ["I", "J"]),
@@ -37,9 +31,9 @@ impl Arc {
         };
         let mut plane = [0; 2];
         for (slot, name) in plane.iter_mut().zip(names) {
-            let axis = control.axes.iter().position(|a| a.address == name);
+            let axis = control.axes().iter().position(|a| a.address() == name);
             *slot = axis.ok_or_else(|| format!("there is no axis {name}"))?;
-            if follower.status[*slot] != Status::Placed {
+            if !program.places().is_placed(*slot) {
                 return Err(format!("where {name} starts is not known"));
             }
         }
@@ -49,7 +43,7 @@ impl Arc {
             Some(Value::Number(n)) => Ok(Some(n.value)),
             Some(Value::Expression) => Err(format!("`{address}` is an expression")),
         };
-        let siemens = follower.dialect == Dialect::Siemens;
+        let siemens = dialect == Dialect::Siemens;
         let radius = if siemens { number("CR")? } else { number("R")? };
         if find("AR").is_some() && siemens {
             return Err("it is given by its opening angle".into());
@@ -77,7 +71,7 @@ impl Arc {
             let mut given = false;
             for k in 0..2 {
                 let Some(value) = number(centres[k])? else {
-                    if follower.absolute_centre {
+                    if program.absolute_centre() {
                         return Err(format!("its centre `{}` is missing", centres[k]));
                     }
                     continue;
@@ -87,7 +81,7 @@ impl Arc {
                 let absolute = match find(centres[k]).map(|w| w.how) {
                     Some(How::Absolute) => true,
                     Some(How::Incremental) => false,
-                    _ => follower.absolute_centre,
+                    _ => program.absolute_centre(),
                 };
                 centre[k] = if absolute { value } else { p[k] + value };
             }
@@ -110,7 +104,7 @@ impl Arc {
         if sweep < 1e-9 {
             sweep = TAU;
         }
-        let more = match follower.dialect {
+        let more = match dialect {
             Dialect::Rs274 => number("P")?.map_or(0.0, |p| (p - 1.0).max(0.0)),
             _ => number("TURN")?.unwrap_or(0.0),
         };

@@ -3,71 +3,44 @@
 //! `docs/compensate.md` (C5) to (C8). Everything here is in m and rad; programmed units end at
 //! [`Control::si`].
 
-use super::frame::Frame;
+use super::axis::{self, Axis};
+use super::frame::{Change, Frame};
+use super::position::Position;
 use super::setup::{Setup, ToolAxis};
 use crate::chain::Chain;
 use crate::inverse::{Goal, Inverse, InverseOptions, Mode};
 use crate::lie::{Mat3, Pose, Vec3};
-use crate::machine::{Branch, JointKind, Machine};
-use crate::nc::{Plane, Units};
-
-/// An address that is followed.
-#[derive(Clone, Debug)]
-pub(super) struct Axis {
-    pub address: String,
-    /// The joint that it commands, and the sign of the program's number against the displacement.
-    pub command: Option<(usize, f64)>,
-    /// 0, 1, 2 for X, Y, Z: component of the tip where the tool centre point function is on.
-    pub tip: Option<usize>,
-    pub rotary: bool,
-}
+use crate::machine::{Branch, Machine};
+use crate::nc::{Block, Dialect, Plane, Units};
 
 /// What the control has in force.
+#[derive(Clone)]
 pub(super) struct Control<'a> {
     machine: &'a Machine,
-    pub setup: &'a Setup,
-    pub nominal: Chain<f64>,
+    setup: &'a Setup,
+    nominal: Chain<f64>,
     inverse: Inverse<'a>,
-    pub axes: Vec<Axis>,
-    pub units: Units,
-    pub tcp: bool,
-    pub frame: Frame,
+    axes: Vec<Axis>,
+    units: Units,
+    tcp: bool,
+    frame: Frame,
     /// Work offset less the machine's zero, by axis, m or rad.
     offset: Vec<f64>,
     /// Tool length that the control counts with, m.
-    pub length: f64,
+    length: f64,
     /// Length of the tool that is in the spindle, m.
-    pub tip_length: f64,
+    tip_length: f64,
     /// Normal of the plane: component of the tip.
-    pub normal: usize,
+    normal: usize,
     /// Direction in which the control counts the tool length: component of the tip.
-    pub length_axis: usize,
+    length_axis: usize,
     /// The program's own frame, before [`Frame`], in `w`; tool centre point function on.
     w_from_program: Pose<f64>,
 }
 
-/// X, Y, Z.
-const TIP: [&str; 3] = ["X", "Y", "Z"];
-
 impl<'a> Control<'a> {
     pub fn new(machine: &'a Machine, setup: &'a Setup) -> Self {
-        let tip = |address: &str| TIP.iter().position(|t| *t == address);
-        let mut axes: Vec<Axis> = (0..machine.commands().len())
-            .map(|c| {
-                let joint = machine.command_joint(c);
-                let word = joint.nc_word();
-                let address = word.address.to_ascii_uppercase();
-                let rotary = joint.kind == JointKind::Revolute;
-                Axis { tip: tip(&address), address, command: Some((c, f64::from(word.sign))), rotary }
-            })
-            .collect();
-        for (k, address) in TIP.into_iter().enumerate() {
-            if !axes.iter().any(|a| a.address == address) {
-                axes.push(Axis { address: address.into(), command: None, tip: Some(k), rotary: false });
-            }
-        }
-        // The order in which people write them: X Y Z first.
-        axes.sort_by_key(|a| (a.tip.map_or(3, |k| k), a.address.clone()));
+        let axes = Axis::all(machine);
         let count = axes.len();
         // What the program means is asked here, not whether the machine can.
         let exact = InverseOptions { within_travel: false, ..InverseOptions::default() };
@@ -91,26 +64,88 @@ impl<'a> Control<'a> {
         control
     }
 
+    /// What the program and its control have agreed on beforehand.
+    pub fn setup(&self) -> &'a Setup {
+        self.setup
+    }
+
+    pub fn machine(&self) -> &'a Machine {
+        self.machine
+    }
+
+    /// The machine as it is meant.
+    pub fn nominal(&self) -> &Chain<f64> {
+        &self.nominal
+    }
+
+    /// The addresses that are followed: X, Y, Z first.
+    pub fn axes(&self) -> &[Axis] {
+        &self.axes
+    }
+
+    /// Unit of lengths in force.
+    pub fn units(&self) -> Units {
+        self.units
+    }
+
+    pub fn set_units(&mut self, units: Units) {
+        self.units = units;
+    }
+
+    /// Whether coordinates are those of the tool centre point.
+    pub fn tcp(&self) -> bool {
+        self.tcp
+    }
+
+    pub fn set_tcp(&mut self, on: bool) {
+        self.tcp = on;
+    }
+
+    /// Normal of the plane: component of the tip.
+    pub fn normal(&self) -> usize {
+        self.normal
+    }
+
+    /// By axis: whether it is one of the two linear axes of the plane.
+    pub fn in_plane(&self) -> Vec<bool> {
+        self.axes.iter().map(|a| a.tip().is_some_and(|k| k != self.normal)).collect()
+    }
+
+    /// Tool lengths, m: `counted` is the one that the control counts with, `tip` that of the tool in the spindle.
+    pub fn set_lengths(&mut self, counted: f64, tip: f64) {
+        (self.length, self.tip_length) = (counted, tip);
+    }
+
     /// A programmed number of an axis, m or rad.
     pub fn si(&self, axis: usize, value: f64) -> f64 {
-        if self.axes[axis].rotary { value.to_radians() } else { self.length_si(value) }
+        self.axes[axis].si(value, self.units)
     }
 
     /// A programmed length, m.
     pub fn length_si(&self, value: f64) -> f64 {
-        match self.units {
-            Units::Millimetre => value / 1e3,
-            Units::Inch => value * 25.4 / 1e3,
-        }
+        axis::length_si(value, self.units)
     }
 
     /// m or rad as the program writes it.
     pub fn programmed(&self, axis: usize, si: f64) -> f64 {
-        match (self.axes[axis].rotary, self.units) {
-            (true, _) => si.to_degrees(),
-            (false, Units::Millimetre) => si * 1e3,
-            (false, Units::Inch) => si * 1e3 / 25.4,
-        }
+        self.axes[axis].programmed(si, self.units)
+    }
+
+    /// Takes a block that changes the frame into account, as [`Frame::change`].
+    pub fn change_frame(
+        &mut self,
+        block: &Block,
+        dialect: Dialect,
+        plane: Option<Plane>,
+        place: &[Option<f64>],
+    ) -> Change {
+        self.frame.change(block, dialect, (&self.axes, self.units), plane, place)
+    }
+
+    /// Whether a frame tilts the direction of the tool length, which then lies along no axis; tool centre point function off.
+    pub fn tilts_length(&self) -> bool {
+        let tilted = !self.frame.is_straight() && !self.frame.keeps(self.length_axis);
+        !self.tcp && tilted && self.length != 0.0
     }
 
     /// `length_follows`: whether the tool length goes with the plane (Siemens) or stays with Z.
@@ -127,13 +162,13 @@ impl<'a> Control<'a> {
     pub fn set_offset(&mut self, name: Option<&str>) -> bool {
         let mut known = true;
         for i in 0..self.axes.len() {
-            let Axis { address, rotary, .. } = &self.axes[i];
+            let (address, rotary) = (self.axes[i].address(), self.axes[i].is_rotary());
             let value = match name {
                 None => Some(0.0),
-                Some(name) => self.setup.offset(name, address, *rotary),
+                Some(name) => self.setup.offset(name, address, rotary),
             };
             known &= value.is_some();
-            self.offset[i] = value.unwrap_or(0.0) - self.setup.zero(address, *rotary);
+            self.offset[i] = value.unwrap_or(0.0) - self.setup.zero(address, rotary);
         }
         self.w_from_program = self.program_frame();
         known
@@ -145,11 +180,11 @@ impl<'a> Control<'a> {
     fn program_frame(&self) -> Pose<f64> {
         let mut q = vec![0.0; self.machine.commands().len()];
         for (i, axis) in self.axes.iter().enumerate() {
-            if let Some((c, sign)) = axis.command {
+            if let Some((c, sign)) = axis.command() {
                 let on_table = self.machine.joints().any(|(j, joint)| {
                     joint.name == self.machine.commands()[c] && self.machine.branch(j) == Branch::Workpiece
                 });
-                if !axis.rotary || on_table {
+                if !axis.is_rotary() || on_table {
                     q[c] = sign * self.offset[i];
                 }
             }
@@ -172,16 +207,26 @@ impl<'a> Control<'a> {
         }
     }
 
-    /// The tool that is in the spindle.
+    /// The tip of the tool that is in the spindle, in frame `t`.
     pub fn tip(&self) -> Pose<f64> {
         self.t_from_tip(if self.tcp { self.length } else { self.tip_length })
+    }
+
+    /// The tip in frame `w` with the joints at `q`, by the nominal kinematics.
+    pub fn tip_pose(&self, q: &[f64]) -> Pose<f64> {
+        self.nominal.w_from_t(q) * self.tip()
+    }
+
+    /// Where tip and tool axis should be with the joints at `q`.
+    pub fn goal(&self, q: &[f64]) -> Goal {
+        Goal { t_from_tip: self.tip(), w_from_tip: self.tip_pose(q) }
     }
 
     /// The three coordinates of the tip among `program`.
     fn triple(&self, program: &[f64]) -> Vec3<f64> {
         let mut p = [0.0; 3];
         for (axis, value) in self.axes.iter().zip(program) {
-            if let Some(k) = axis.tip {
+            if let Some(k) = axis.tip() {
                 p[k] = *value;
             }
         }
@@ -194,18 +239,18 @@ impl<'a> Control<'a> {
     /// `program`: one per axis, m or rad. `near`: commands of joints without address, and a start for the
     /// rest.
     pub fn joints(&self, program: &[f64], near: &[f64]) -> Option<Vec<f64>> {
-        let p = self.frame.pose.transform(self.triple(program));
+        let p = self.frame.pose().transform(self.triple(program));
         let mut q = near.to_vec();
         let mut free = vec![false; q.len()];
         for (i, axis) in self.axes.iter().enumerate() {
-            let Some((c, sign)) = axis.command else { continue };
-            match axis.tip {
+            let Some((c, sign)) = axis.command() else { continue };
+            match axis.tip() {
                 Some(_) if self.tcp => free[c] = true,
                 Some(k) => {
                     let length = if k == self.length_axis { self.length } else { 0.0 };
                     q[c] = sign * (p.0[k] + self.offset[i] + length);
                 }
-                None => q[c] = sign * (program[i] + self.offset[i] + self.frame.shift[i]),
+                None => q[c] = sign * (program[i] + self.offset[i] + self.frame.shift(i)),
             }
         }
         if !self.tcp {
@@ -220,17 +265,17 @@ impl<'a> Control<'a> {
     /// Program coordinates of joint commands, one per axis; `other`: of addresses without joint.
     pub fn program(&self, q: &[f64], other: &[f64]) -> Vec<f64> {
         let mut p = [0.0; 3];
-        let back = self.frame.pose.inverse();
+        let back = self.frame.pose().inverse();
         if self.tcp {
             let tip = (self.nominal.w_from_t(q) * self.t_from_tip(self.length)).translation;
             p = back.transform(self.w_from_program.inverse().transform(tip)).0;
         } else {
             // An axis that the machine lacks stands where the program says.
-            let lacking = self.frame.pose.transform(self.triple(other));
+            let lacking = self.frame.pose().transform(self.triple(other));
             for (i, axis) in self.axes.iter().enumerate() {
-                if let Some(k) = axis.tip {
+                if let Some(k) = axis.tip() {
                     let length = if k == self.length_axis { self.length } else { 0.0 };
-                    p[k] = match axis.command {
+                    p[k] = match axis.command() {
                         Some((c, sign)) => sign * q[c] - self.offset[i] - length,
                         None => lacking.0[k],
                     };
@@ -238,23 +283,41 @@ impl<'a> Control<'a> {
             }
             p = back.transform(Vec3(p)).0;
         }
-        let of = |(i, axis): (usize, &Axis)| match (axis.tip, axis.command) {
+        let of = |(i, axis): (usize, &Axis)| match (axis.tip(), axis.command()) {
             (Some(k), _) => p[k],
-            (None, Some((c, sign))) => sign * q[c] - self.offset[i] - self.frame.shift[i],
+            (None, Some((c, sign))) => sign * q[c] - self.offset[i] - self.frame.shift(i),
             (None, None) => other[i],
         };
         self.axes.iter().enumerate().map(of).collect()
     }
 
+    /// The joints at a part `s` of a straight move, as the control moves them.
+    pub fn between(&self, a: &Position, b: &Position, s: f64) -> Option<Vec<f64>> {
+        let mix =
+            |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + (b - a) * s).collect() };
+        let q = mix(a.q(), b.q());
+        if !self.tcp {
+            return Some(q);
+        }
+        self.joints(&mix(a.program(), b.program()), &q)
+    }
+
+    /// Calls a position by the coordinates in force; the machine has not moved.
+    pub fn rename(&self, position: &mut Position) {
+        position.rename(self.program(position.q(), position.program()));
+    }
+
     /// Joint command for a number in the machine's own frame.
     pub fn machine_joint(&self, axis: usize, value: f64) -> Option<(usize, f64)> {
-        let Axis { address, command, rotary, .. } = &self.axes[axis];
-        command.map(|(c, sign)| (c, sign * (value - self.setup.zero(address, *rotary))))
+        let axis = &self.axes[axis];
+        let zero = self.setup.zero(axis.address(), axis.is_rotary());
+        axis.command().map(|(c, sign)| (c, sign * (value - zero)))
     }
 
     /// Whether the words X, Y, Z are this machine's linear joints, so that the tip can be programmed.
     pub fn can_tcp(&self) -> bool {
-        let linear = self.axes.iter().filter(|a| a.tip.is_some()).all(|a| a.command.is_some() && !a.rotary);
+        let linear =
+            self.axes.iter().filter(|a| a.tip().is_some()).all(|a| a.command().is_some() && !a.is_rotary());
         linear && self.inverse.freedoms().1 == 3
     }
 }

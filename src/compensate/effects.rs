@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::model::{Model, at_rest, is_zero};
+use super::model::Model;
+use super::pieces::{at_rest, is_zero};
 use crate::calibration::{CalibratedMachine, LeftOut};
 use crate::chain::Chain;
 use crate::feature::{Feature, Walk};

@@ -6,39 +6,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::cut::Cutter;
+use super::dialect::Dialect;
+use super::fault::NcFault;
 use super::number::Number;
-use super::{Dialect, NcFault, Value, Word};
+use super::token::{Kind, Token};
+use super::words::{Value, Word};
 use crate::error::{Error, Place, Result};
-
-/// A piece of a line. Tokens stand in the order of the line, do not overlap, and only blanks are left between them.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Token {
-    /// What it is.
-    pub kind: Kind,
-    /// Its bytes in the line.
-    pub span: Range<usize>,
-}
-
-/// What a token is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// `N10`, `:10`, Heidenhain's bare `10`.
-    BlockNumber,
-    /// `/` or `/3` at the start: the block is left out when the operator wants so.
-    Skip,
-    /// `( ... )`, or `;` to the end of the line.
-    Comment,
-    /// A whole line that starts with `%`.
-    Percent,
-    /// An address with a value: index into [`Block::words`].
-    Word(usize),
-    /// A name with its arguments: `CYCLE800(...)`, `MSG("...")`.
-    Call,
-    /// A name without value: `TRAORI`, Heidenhain's `L`.
-    Name,
-    /// Everything else, passed through: strings, assignments to parameters, what follows `IF` or `DEF`, unknown bytes.
-    Other,
-}
 
 /// One line of a program, its tokens, and the changes that should be written.
 #[derive(Clone, Debug)]
@@ -87,6 +60,16 @@ impl Block {
     /// The words of the line as read; changes do not show here.
     pub fn words(&self) -> &[Word] {
         &self.words
+    }
+
+    /// Whether a word has this address.
+    pub(super) fn has_word(&self, address: &str) -> bool {
+        self.words.iter().any(|w| w.address == address)
+    }
+
+    /// The value of the first word of this address, as written.
+    pub(super) fn word_text(&self, address: &str) -> Option<String> {
+        self.words.iter().find(|w| w.address == address).map(|w| self.text(&w.value_span))
     }
 
     /// The bytes of a token or word as text, for messages.

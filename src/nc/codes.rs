@@ -1,6 +1,6 @@
 //! Names and codes of the dialects that change what follows them in a block or in the program.
 
-use super::Dialect;
+use super::dialect::Dialect;
 
 /// Functions of RS-274 that may stand directly behind an address: `XSIN[30]`.
 pub(super) const FUNCTIONS: &[&str] = &[

@@ -1,12 +1,63 @@
 //! What names and codes of a block change, before its axis words are looked at.
 
+use super::axes::{Axes, is_linear};
+use super::block::Block;
 use super::codes::{by_name, frame, harmless_call, interpolation, jumps, modal_name, other_transformation};
-use super::state::{Purpose, Reading, has_word, is_linear, word_text};
-use super::{Block, Dialect, Distance, Feed, Kind, MotionKind, Plane, State, Units, Value, Why};
+use super::dialect::Dialect;
+use super::modes::{Distance, Feed, Modes, MotionKind, Plane, Units, Why};
+use super::motion::Step;
+use super::token::Kind;
+use super::words::Value;
 
-impl State {
+/// What the numbers of axis words in a block are for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    Target,
+    /// `G92`: the present place gets these numbers.
+    Preset,
+    /// Frames, dwell, arguments.
+    Nothing,
+    /// `G28`: the axes named end elsewhere.
+    Reference,
+}
+
+/// What is gathered from one block.
+pub(super) struct Reading {
+    pub step: Step,
+    pub purpose: Purpose,
+    pub kind: Option<MotionKind>,
+    pub probes: bool,
+    pub machine_frame: bool,
+}
+
+/// The effects of one block on what is in force.
+pub(super) struct Effects<'a> {
+    dialect: Dialect,
+    modes: &'a mut Modes,
+    axes: &'a mut Axes,
+    reading: Reading,
+}
+
+impl<'a> Effects<'a> {
+    /// Nothing has been read.
+    pub fn new(dialect: Dialect, modes: &'a mut Modes, axes: &'a mut Axes) -> Self {
+        let reading = Reading {
+            step: Step::default(),
+            purpose: Purpose::Target,
+            kind: None,
+            probes: false,
+            machine_frame: false,
+        };
+        Effects { dialect, modes, axes, reading }
+    }
+
+    /// What the block says beside its axis words.
+    pub fn finish(self) -> Reading {
+        self.reading
+    }
+
     /// Names and calls.
-    pub(super) fn names(&mut self, block: &Block, reading: &mut Reading) {
+    pub fn names(&mut self, block: &Block) {
         let line = block.line();
         let mut tokens = block
             .tokens()
@@ -25,33 +76,33 @@ impl State {
                 _ => continue,
             };
             if self.dialect == Dialect::Heidenhain {
-                self.heidenhain(&name, next.unwrap_or_default(), block, reading);
+                self.heidenhain(&name, next.unwrap_or_default(), block);
                 continue;
             }
             let called = token.kind == Kind::Call;
             match name.as_str() {
                 "TRAORI" => self.transform(true, line),
                 "TRAFOOF" => self.transform(false, line),
-                "SUPA" => reading.machine_frame = true,
+                "SUPA" => self.reading.machine_frame = true,
                 "CYCLE800" => {
-                    reading.step.changes_frame = true;
-                    self.lose(line, Why::Frame, |_| true);
+                    self.reading.step.changes_frame = true;
+                    self.axes.lose(line, Why::Frame, |_| true);
                 }
                 name if frame(name) => {
-                    reading.step.changes_frame = true;
-                    reading.purpose = Purpose::Nothing;
+                    self.reading.step.changes_frame = true;
+                    self.reading.purpose = Purpose::Nothing;
                     self.frame_moved(block, line);
                 }
                 name if other_transformation(name) => {
-                    reading.step.changes_frame = true;
+                    self.reading.step.changes_frame = true;
                     self.modes.tool_centre_point = Some(false);
-                    self.lose(line, Why::Transformation, |_| true);
+                    self.axes.lose(line, Why::Transformation, |_| true);
                 }
-                name if interpolation(name) && !called => reading.kind = Some(MotionKind::Other),
-                name if jumps(name) => reading.step.jumps = true,
-                name if by_name(name) => self.called(line, reading),
+                name if interpolation(name) && !called => self.reading.kind = Some(MotionKind::Other),
+                name if jumps(name) => self.reading.step.jumps = true,
+                name if by_name(name) => self.called(line),
                 "MCALL" => self.modes.modal_call = next.is_some(),
-                name if called && !harmless_call(name) => self.called(line, reading),
+                name if called && !harmless_call(name) => self.called(line),
                 // Alone in its block: a program of the user.
                 name if self.dialect == Dialect::Siemens
                     && !called
@@ -60,7 +111,7 @@ impl State {
                     && next.is_none()
                     && !modal_name(name) =>
                 {
-                    self.called(line, reading);
+                    self.called(line);
                 }
                 _ => {}
             }
@@ -68,20 +119,20 @@ impl State {
     }
 
     /// Heidenhain's statements.
-    fn heidenhain(&mut self, name: &str, next: String, block: &Block, reading: &mut Reading) {
+    fn heidenhain(&mut self, name: &str, next: String, block: &Block) {
         let line = block.line();
         match name {
             "L" | "LN" => {
                 let rapid = block.tokens().iter().any(|t| t.kind == Kind::Name && block.name(t) == "FMAX");
-                reading.kind = Some(if rapid { MotionKind::Rapid } else { MotionKind::Linear });
+                self.reading.kind = Some(if rapid { MotionKind::Rapid } else { MotionKind::Linear });
             }
             "C" | "CR" | "CT" | "LP" | "CP" | "CTP" | "RND" | "CHF" | "APPR" | "DEP" => {
-                reading.kind = Some(MotionKind::Other);
+                self.reading.kind = Some(MotionKind::Other);
                 if matches!(name, "LP" | "CP" | "CTP" | "DEP") {
-                    self.lose(line, Why::OtherWords, is_linear);
+                    self.axes.lose(line, Why::OtherWords, is_linear);
                 }
             }
-            "CC" => reading.purpose = Purpose::Nothing,
+            "CC" => self.reading.purpose = Purpose::Nothing,
             "FUNCTION" if next.starts_with("TCPM") => self.transform(true, line),
             "FUNCTION" if next.starts_with("RESET TCPM") => self.transform(false, line),
             "TOOL" if next.starts_with("CALL") => {
@@ -89,22 +140,22 @@ impl State {
                 self.tool_changed(line);
             }
             "PLANE" | "TRANS" => {
-                reading.step.changes_frame = true;
-                self.lose(line, Why::Frame, |_| true);
+                self.reading.step.changes_frame = true;
+                self.axes.lose(line, Why::Frame, |_| true);
             }
             "CYCL" => {
                 let words: Vec<&str> = next.split_ascii_whitespace().collect();
                 let number = words.get(1).and_then(|n| n.split('.').next()).and_then(|n| n.parse().ok());
                 if words.first() == Some(&"CALL") {
-                    self.called(line, reading);
+                    self.called(line);
                 } else if matches!(number, Some(7 | 8 | 10 | 11 | 19 | 26 | 247)) {
-                    reading.step.changes_frame = true;
-                    self.lose(line, Why::Frame, |_| true);
+                    self.reading.step.changes_frame = true;
+                    self.axes.lose(line, Why::Frame, |_| true);
                 }
             }
-            "CALL" | "PATTERN" | "TCH" | "SEL" => self.called(line, reading),
+            "CALL" | "PATTERN" | "TCH" | "SEL" => self.called(line),
             "FN" => {
-                reading.step.jumps =
+                self.reading.step.jumps =
                     matches!(next.trim_start().split(':').next(), Some("9" | "10" | "11" | "12"))
             }
             _ => {}
@@ -117,18 +168,18 @@ impl State {
         let inner = text.strip_prefix("POSA[").or_else(|| text.strip_prefix("POS["));
         if let Some(axis) = inner.and_then(|t| t.split(']').next()) {
             let axis = axis.trim().to_string();
-            self.lose(line, Why::Expression, |address| address == axis);
+            self.axes.lose(line, Why::Expression, |address| address == axis);
         }
     }
 
     /// G, M, T, D and H words.
-    pub(super) fn codes(&mut self, block: &Block, words: &[Vec<usize>], reading: &mut Reading) {
+    /// `names_axis`: whether the block has words of axes that are followed.
+    pub fn codes(&mut self, block: &Block, names_axis: bool) {
         let line = block.line();
-        let names_axis = words.iter().any(|w| !w.is_empty());
         for word in block.words() {
             let Value::Number(number) = word.value else {
                 match word.address.as_str() {
-                    "G" | "M" => self.called(line, reading),
+                    "G" | "M" => self.called(line),
                     "T" => self.modes.tool = Some(block.text(&word.value_span)),
                     "D" | "H" => {
                         self.modes.length_offset = None;
@@ -141,18 +192,18 @@ impl State {
             let tenths = (number.value * 10.0).round();
             let code = if (0.0..1e6).contains(&tenths) { tenths as u32 } else { u32::MAX };
             match word.address.as_str() {
-                "G" => self.g_code(code, names_axis, block, reading),
-                "M" => self.m_code(code, line, reading),
+                "G" => self.g_code(code, names_axis, block),
+                "M" => self.m_code(code, line),
                 "T" => self.modes.tool = Some(block.text(&word.value_span)),
                 "D" if self.dialect == Dialect::Siemens => self.offset_number(number.value, line),
                 "H" if self.dialect == Dialect::Rs274 => self.offset_number(number.value, line),
-                "L" if self.dialect == Dialect::Siemens => self.called(line, reading),
+                "L" if self.dialect == Dialect::Siemens => self.called(line),
                 _ => {}
             }
         }
     }
 
-    fn g_code(&mut self, code: u32, names_axis: bool, block: &Block, reading: &mut Reading) {
+    fn g_code(&mut self, code: u32, names_axis: bool, block: &Block) {
         use MotionKind::*;
         let line = block.line();
         let (rs274, siemens) = (self.dialect == Dialect::Rs274, self.dialect == Dialect::Siemens);
@@ -160,25 +211,25 @@ impl State {
         match code {
             // DIN/ISO at Heidenhain: datum shift, mirror, scale, rotation, tilted plane; call of a cycle.
             280 | 530 | 540 | 720 | 730 | 800 if !rs274 && !siemens => {
-                reading.purpose = Purpose::Nothing;
-                reading.step.changes_frame = true;
-                self.lose(line, Why::Frame, |_| true);
+                self.reading.purpose = Purpose::Nothing;
+                self.reading.step.changes_frame = true;
+                self.axes.lose(line, Why::Frame, |_| true);
             }
-            790 if !rs274 && !siemens => self.called(line, reading),
-            0 => reading.kind = Some(Rapid),
-            10 => reading.kind = Some(Linear),
-            20 => reading.kind = Some(ArcCw),
-            30 => reading.kind = Some(ArcCcw),
-            22 | 32 | 50..=53 | 62 if names_axis && !siemens => reading.kind = Some(Other),
-            330..=349 | 3310 | 3320 => reading.kind = Some(Other),
-            40 => reading.purpose = Purpose::Nothing,
+            790 if !rs274 && !siemens => self.called(line),
+            0 => self.reading.kind = Some(Rapid),
+            10 => self.reading.kind = Some(Linear),
+            20 => self.reading.kind = Some(ArcCw),
+            30 => self.reading.kind = Some(ArcCcw),
+            22 | 32 | 50..=53 | 62 if names_axis && !siemens => self.reading.kind = Some(Other),
+            330..=349 | 3310 | 3320 => self.reading.kind = Some(Other),
+            40 => self.reading.purpose = Purpose::Nothing,
             730 | 740 | 760 | 810..=890 if rs274 => {
-                reading.kind = Some(if code == 760 && !names_axis { Other } else { Cycle })
+                self.reading.kind = Some(if code == 760 && !names_axis { Other } else { Cycle })
             }
-            800 if rs274 => reading.kind = Some(Unstated),
+            800 if rs274 => self.reading.kind = Some(Unstated),
             310..=319 | 380..=385 if rs274 => {
-                reading.kind = Some(Other);
-                reading.probes = true;
+                self.reading.kind = Some(Other);
+                self.reading.probes = true;
             }
             170 => self.modes.plane = Some(Plane::Xy),
             180 => self.modes.plane = Some(Plane::Zx),
@@ -186,7 +237,7 @@ impl State {
             200 | 7000 => self.measured_in(Units::Inch, line),
             210 | 7100 => self.measured_in(Units::Millimetre, line),
             // G70 and G71 with P and Q are cycles of lathes.
-            700 | 710 if !has_word(block, "P") => {
+            700 | 710 if !block.has_word("P") => {
                 self.measured_in(if code == 700 { Units::Inch } else { Units::Millimetre }, line)
             }
             900 => self.modes.distance = Some(Distance::Absolute),
@@ -211,94 +262,94 @@ impl State {
                     self.length_changed(line);
                 }
             }
-            530 | 1530 => reading.machine_frame = true,
-            531 | 536 if rs274 => self.lose(line, Why::Frame, |_| true),
+            530 | 1530 => self.reading.machine_frame = true,
+            531 | 536 if rs274 => self.axes.lose(line, Why::Frame, |_| true),
             580 | 590 if siemens => {
-                reading.step.changes_frame = true;
-                reading.purpose = Purpose::Nothing;
+                self.reading.step.changes_frame = true;
+                self.reading.purpose = Purpose::Nothing;
                 self.frame_moved(block, line);
             }
             540..=593 if whole || rs274 => {
-                let place = (rs274 && code == 541).then(|| word_text(block, "P")).flatten();
+                let place = (rs274 && code == 541).then(|| block.word_text("P")).flatten();
                 let name =
                     if whole { format!("G{}", code / 10) } else { format!("G{}.{}", code / 10, code % 10) };
                 self.offset_named(place.map_or(name.clone(), |p| format!("{name} P{p}")), line);
             }
             5000 | 5050..=5990 if siemens && whole => self.offset_named(format!("G{}", code / 10), line),
-            280..=309 if rs274 => reading.purpose = Purpose::Reference,
-            740 | 750 | 7510 if siemens => reading.purpose = Purpose::Reference,
-            250 | 260 if siemens => reading.purpose = Purpose::Nothing,
-            1100..=1120 if siemens => reading.purpose = Purpose::Nothing,
+            280..=309 if rs274 => self.reading.purpose = Purpose::Reference,
+            740 | 750 | 7510 if siemens => self.reading.purpose = Purpose::Reference,
+            250 | 260 if siemens => self.reading.purpose = Purpose::Nothing,
+            1100..=1120 if siemens => self.reading.purpose = Purpose::Nothing,
             100 if rs274 => {
-                reading.purpose = Purpose::Nothing;
-                reading.step.changes_frame = true;
+                self.reading.purpose = Purpose::Nothing;
+                self.reading.step.changes_frame = true;
                 self.frame_moved(block, line);
             }
             650..=670 if rs274 => {
-                reading.purpose = Purpose::Nothing;
+                self.reading.purpose = Purpose::Nothing;
                 // G66 calls behind every block that moves, until G67.
                 self.modes.modal_call = code / 10 == 66;
                 if code != 670 {
-                    self.called(line, reading);
+                    self.called(line);
                 }
             }
             920 if names_axis && !siemens => {
-                reading.purpose = Purpose::Preset;
-                reading.step.changes_frame = true;
+                self.reading.purpose = Purpose::Preset;
+                self.reading.step.changes_frame = true;
             }
             921..=923 if !siemens => {
-                reading.step.changes_frame = true;
-                self.lose(line, Why::Frame, |_| true);
+                self.reading.step.changes_frame = true;
+                self.axes.lose(line, Why::Frame, |_| true);
             }
             520 if rs274 => {
-                reading.purpose = Purpose::Nothing;
-                reading.step.changes_frame = true;
+                self.reading.purpose = Purpose::Nothing;
+                self.reading.step.changes_frame = true;
                 self.frame_moved(block, line);
             }
             // With S, G50 is a limit of the spindle.
-            500 if has_word(block, "S") => {}
+            500 if block.has_word("S") => {}
             500 | 501 | 510 | 511 | 680..=694 | 2540 | 2550 if rs274 => {
-                reading.purpose = Purpose::Nothing;
-                reading.step.changes_frame = true;
+                self.reading.purpose = Purpose::Nothing;
+                self.reading.step.changes_frame = true;
                 self.frame_moved(block, line);
             }
             _ => {}
         }
     }
 
-    fn m_code(&mut self, code: u32, line: usize, reading: &mut Reading) {
+    fn m_code(&mut self, code: u32, line: usize) {
         match code {
             60 => self.tool_changed(line),
             970 | 980 if self.dialect == Dialect::Rs274 => {
-                reading.purpose = Purpose::Nothing;
-                self.called(line, reading);
+                self.reading.purpose = Purpose::Nothing;
+                self.called(line);
             }
-            990 if self.dialect == Dialect::Rs274 => reading.step.jumps = true,
+            990 if self.dialect == Dialect::Rs274 => self.reading.step.jumps = true,
             1280 if self.dialect == Dialect::Heidenhain => self.transform(true, line),
             1290 if self.dialect == Dialect::Heidenhain => self.transform(false, line),
-            910 | 920 if self.dialect == Dialect::Heidenhain => reading.machine_frame = true,
-            890 | 990 if self.dialect == Dialect::Heidenhain => self.called(line, reading),
+            910 | 920 if self.dialect == Dialect::Heidenhain => self.reading.machine_frame = true,
+            890 | 990 if self.dialect == Dialect::Heidenhain => self.called(line),
             _ => {}
         }
     }
 
     fn transform(&mut self, on: bool, line: usize) {
         if self.modes.tool_centre_point.replace(on) != Some(on) {
-            self.lose(line, Why::Transformation, is_linear);
+            self.axes.lose(line, Why::Transformation, is_linear);
         }
     }
 
     fn measured_in(&mut self, units: Units, line: usize) {
         if self.modes.units.replace(units).is_some_and(|before| before != units) {
-            self.lose(line, Why::Units, is_linear);
+            self.axes.lose(line, Why::Units, is_linear);
         }
     }
 
     fn offset_named(&mut self, name: String, line: usize) {
         match self.modes.work_offset.replace(name.clone()) {
             Some(before) if before == name => {}
-            Some(_) => self.lose(line, Why::WorkOffset, |_| true),
-            None => self.lose(line, Why::WorkOffset, is_linear),
+            Some(_) => self.axes.lose(line, Why::WorkOffset, |_| true),
+            None => self.axes.lose(line, Why::WorkOffset, is_linear),
         }
     }
 
@@ -310,30 +361,22 @@ impl State {
 
     /// The tool length acts along the normal of the plane.
     fn length_changed(&mut self, line: usize) {
-        let normal = self.normal();
-        self.lose(line, Why::Tool, |address| address.starts_with(normal));
-    }
-
-    pub(super) fn normal(&self) -> char {
-        match self.modes.plane {
-            None | Some(Plane::Xy) => 'Z',
-            Some(Plane::Zx) => 'Y',
-            Some(Plane::Yz) => 'X',
-        }
+        let normal = self.modes.normal();
+        self.axes.lose(line, Why::Tool, |address| address.starts_with(normal));
     }
 
     fn tool_changed(&mut self, line: usize) {
-        self.lose(line, Why::Tool, is_linear);
+        self.axes.lose(line, Why::Tool, is_linear);
     }
 
-    fn called(&mut self, line: usize, reading: &mut Reading) {
-        reading.step.calls = true;
-        self.lose(line, Why::Call, |_| true);
+    fn called(&mut self, line: usize) {
+        self.reading.step.calls = true;
+        self.axes.lose(line, Why::Call, |_| true);
     }
 
     /// Lengths mean something else now; an angle does only where the block names its axis.
     fn frame_moved(&mut self, block: &Block, line: usize) {
         let named: Vec<String> = block.words().iter().map(|w| w.address.clone()).collect();
-        self.lose(line, Why::Frame, |address| is_linear(address) || named.iter().any(|n| n == address));
+        self.axes.lose(line, Why::Frame, |address| is_linear(address) || named.iter().any(|n| n == address));
     }
 }

@@ -86,6 +86,17 @@ pub struct Modes {
     pub work_offset: Option<String>,
 }
 
+impl Modes {
+    /// First letter of the axis along the normal of the plane.
+    pub(super) fn normal(&self) -> char {
+        match self.plane {
+            None | Some(Plane::Xy) => 'Z',
+            Some(Plane::Zx) => 'Y',
+            Some(Plane::Yz) => 'X',
+        }
+    }
+}
+
 /// Why a coordinate is not known any more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Why {

@@ -1,6 +1,6 @@
 //! Numbers as a program writes them: the value, and the habits of who wrote it.
 
-use super::Dialect;
+use super::dialect::Dialect;
 
 /// Most digits behind the point that are ever written.
 pub(super) const MOST_DECIMALS: usize = 300;

@@ -6,7 +6,9 @@ use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{Block, Dialect, NcFault};
+use super::block::Block;
+use super::dialect::Dialect;
+use super::fault::NcFault;
 use crate::error::{Error, Place, Result};
 
 /// Longest line that is read, bytes.

@@ -2,8 +2,7 @@
 
 use std::ops::Range;
 
-use super::Number;
-use super::number::MOST_DECIMALS;
+use super::number::{MOST_DECIMALS, Number};
 
 /// An address and its value, as in `X1.5`, `C1=90`, `X=AC(10)`, `X[#1+2]`.
 #[derive(Clone, Debug, PartialEq)]

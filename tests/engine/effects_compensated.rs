@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 
 use crate::common;
-use kincal::compensate::{Options, Report, Setup, compensate_text};
+use kincal::compensate::{CompensateOptions, Report, Setup, compensate_text};
 use kincal::diagnose::{DiagnoseOptions, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts, StoredEffect};
 use kincal::predict::predict;
@@ -76,7 +76,7 @@ fn program(path: &[Vec<f64>]) -> String {
 fn compensated(model: &CalibratedMachine, path: &[Vec<f64>]) -> (Vec<Vec<f64>>, Report) {
     let setup = "Setup(tools: {\"1\": 120}, reference_length: 120, work_offsets: {\"G54\": {\"X\": 0, \"Y\": 0, \"Z\": -120}})";
     let setup = Setup::parse("setup.ron", setup).unwrap_or_else(|e| panic!("{e}"));
-    let (text, report) = compensate_text(model, "part.nc", program(path), &setup, &Options::default())
+    let (text, report) = compensate_text(model, "part.nc", program(path), &setup, &CompensateOptions::default())
         .unwrap_or_else(|e| panic!("{e}"));
     let sent = text.lines().filter(|line| line.starts_with("N1 ")).map(|line| {
         let word = |letter: char| line.split(' ').find_map(|w| w.strip_prefix(letter)).expect("a word");

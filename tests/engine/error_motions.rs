@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::table::{Axes, Bar, Table, path, record};
-use kincal::compensate::{CalibrateOptions as Writing, Setup, compensate_text};
+use kincal::compensate::{CompensateOptions as Writing, Setup, compensate_text};
 use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
 use kincal::lie::Twist;
 use kincal::predict::predict;

@@ -5,8 +5,8 @@
 use std::fmt::Write;
 
 use crate::common;
-use kincal::compensate::{Options, Setup, compensate_text};
-use kincal::identify::{ErrorModel, Options as Fitting, calibrate, calibrate_model};
+use kincal::compensate::{CompensateOptions, Setup, compensate_text};
+use kincal::identify::{ErrorModel, CalibrateOptions as Fitting, calibrate, calibrate_model};
 use kincal::inverse::{Goal, Inverse, Mode};
 use kincal::lie::{Pose, Vec3};
 use kincal::machine::JointKind;
@@ -208,7 +208,7 @@ fn a_measured_machine_cuts_what_its_corrected_program_means() {
             let (text, setup) = (program(&machine, &path, tcp), setup(&machine, tcp));
             let start = std::time::Instant::now();
             let (corrected, report) =
-                compensate_text(&calibrated, "path.nc", &text, &setup, &Options::default())
+                compensate_text(&calibrated, "path.nc", &text, &setup, &CompensateOptions::default())
                     .unwrap_or_else(|e| panic!("{name}: {e}"));
             let seconds = start.elapsed().as_secs_f64();
             let before = errors(&machine, &actual.chain(), &path, &execute(&machine, &text, tcp));
@@ -256,7 +256,7 @@ fn corrected_positions_are_those_of_the_inverse() {
         "path.nc",
         program(&machine, &path, false),
         &setup(&machine, false),
-        &Options::default(),
+        &CompensateOptions::default(),
     )
     .expect("a plain program");
     let inverse = Inverse::new(&machine).with_mode(Mode::PositionAndAxis);
@@ -312,7 +312,7 @@ fn one_ballbar_corrects_what_it_sees_and_the_report_says_what_it_does_not() {
         let path = &paths[0];
         let text = program(&machine, path, true);
         let (corrected, report) =
-            compensate_text(&calibrated, "path.nc", &text, &setup(&machine, true), &Options::default())
+            compensate_text(&calibrated, "path.nc", &text, &setup(&machine, true), &CompensateOptions::default())
                 .unwrap_or_else(|e| panic!("{name}: {e}"));
         let along = |sent: Vec<Vec<f64>>| {
             let chain = actual.chain();

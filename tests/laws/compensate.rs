@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common;
-use kincal::compensate::{Model, Options, Report, Setup, compensate_text, compensate_with};
+use kincal::compensate::{Model, CompensateOptions, Report, Setup, compensate_text, compensate_with};
 use kincal::lie::{Twist, Vec3};
 use kincal::nc::{Program, State};
 use kincal::simulate::random_deviations;
@@ -23,7 +23,7 @@ fn erroneous(stem: &str, size: f64) -> CalibratedMachine {
     CalibratedMachine::nominal(machine).with_deviations(deviations)
 }
 
-fn run(calibrated: &CalibratedMachine, text: &str, options: &Options) -> (String, Report) {
+fn run(calibrated: &CalibratedMachine, text: &str, options: &CompensateOptions) -> (String, Report) {
     with_setup(calibrated, text, "Setup()", options)
 }
 
@@ -31,14 +31,14 @@ fn with_setup(
     calibrated: &CalibratedMachine,
     text: &str,
     setup: &str,
-    options: &Options,
+    options: &CompensateOptions,
 ) -> (String, Report) {
     let setup = Setup::parse("setup.ron", setup).unwrap_or_else(|e| panic!("{e}"));
     compensate_text(calibrated, "part.nc", text, &setup, options).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn message(calibrated: &CalibratedMachine, text: &str) -> String {
-    let refused = compensate_text(calibrated, "part.nc", text, &Setup::default(), &Options::default());
+    let refused = compensate_text(calibrated, "part.nc", text, &Setup::default(), &CompensateOptions::default());
     let error = refused.err().unwrap_or_else(|| panic!("corrected:\n{text}"));
     format!("{error} | {}", error.mend())
 }
@@ -77,7 +77,7 @@ const AXES: [&str; 5] = ["X", "Y", "Z", "A", "C"];
 fn a_modal_coordinate_is_corrected_where_it_is_not_repeated() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let text = "G21 G90\nG0 X0 Y0 Z50 A40 C10 (start)\nG1 X100. F500\n\tY-80.5 ; edge\nA41\n";
-    let (out, report) = run(&calibrated, text, &Options::default());
+    let (out, report) = run(&calibrated, text, &CompensateOptions::default());
     let (machine, actual) = (calibrated.machine(), calibrated.chain());
     let (meant, sent) = (targets(text, &AXES), targets(&out, &AXES));
     assert_eq!(meant.len(), sent.len());
@@ -103,7 +103,7 @@ fn increments_add_up_without_drift() {
         let (x, c) = if k % 200 < 100 { (0.7, 0.11) } else { (-0.7, -0.07) };
         text.push_str(&format!("G1 X{x} Y.03 C{c} F900\n"));
     }
-    let (out, _) = run(&calibrated, &text, &Options::default());
+    let (out, _) = run(&calibrated, &text, &CompensateOptions::default());
     let (machine, actual) = (calibrated.machine(), calibrated.chain());
     for (meant, sent) in targets(&text, &AXES).iter().zip(&targets(&out, &AXES)) {
         let left = tip_error(&actual, machine, meant, sent);
@@ -116,7 +116,7 @@ fn inch_programs_are_corrected_in_inches() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let metric = "G21\nG0 X50.8 Y-25.4 Z12.7 A40 C10\n";
     let inch = "G20\nG0 X2. Y-1. Z.5 A40 C10\n";
-    let decimals = Options { decimals: Some(6), ..Options::default() };
+    let decimals = CompensateOptions { decimals: Some(6), ..CompensateOptions::default() };
     let (a, b) = (run(&calibrated, metric, &decimals).0, run(&calibrated, inch, &decimals).0);
     for (mm, inch) in targets(&a, &AXES)[0].iter().zip(&targets(&b, &AXES)[0]).take(3) {
         assert!((mm - 25.4 * inch).abs() < 3e-5, "{a}{b}");
@@ -153,7 +153,7 @@ fn arcs_become_lines_within_the_tolerance_of_the_exact_arc() {
     for tolerance in [2e-6, 2e-5] {
         for (start, block, plane, centre, from, sweep, r, rest) in cases {
             let text = format!("G21 G90\nG0 {start} A40 C10\n{block} F800 (arc)\nG1 X1 Y2 Z3\n");
-            let options = Options { arcs: Some(tolerance), ..Options::default() };
+            let options = CompensateOptions { arcs: Some(tolerance), ..CompensateOptions::default() };
             let (out, report) = run(&calibrated, &text, &options);
             assert_eq!(report.split_arcs, 1);
             assert!(report.largest_arc_m.value <= tolerance, "{block}: {:?}", report.largest_arc_m);
@@ -186,7 +186,7 @@ fn arcs_become_lines_within_the_tolerance_of_the_exact_arc() {
 fn the_motion_in_force_survives_an_arc_that_became_lines() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let text = "G21 G90 G0 X30 Y0 Z5 A40 C10\nG3 X0 Y30 I-30 J0 F80\nX-30 Y0 I0 J-30\nG1 X0\n";
-    let (out, report) = run(&calibrated, text, &Options { arcs: Some(1e-4), ..Options::default() });
+    let (out, report) = run(&calibrated, text, &CompensateOptions { arcs: Some(1e-4), ..CompensateOptions::default() });
     assert_eq!(report.split_arcs, 2);
     // The second arc named no motion of its own.
     assert_eq!(out.matches("G1 ").count(), 3, "{out}");
@@ -198,7 +198,7 @@ fn the_motion_in_force_survives_an_arc_that_became_lines() {
 fn under_inverse_time_every_line_has_its_share() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let text = "G21 G90 G0 X30 Y0 Z5 A40 C10\nG93 G3 X0 Y30 I-30 J0 F2.5\nG1 X4 F7\n";
-    let (out, report) = run(&calibrated, text, &Options { arcs: Some(1e-4), ..Options::default() });
+    let (out, report) = run(&calibrated, text, &CompensateOptions { arcs: Some(1e-4), ..CompensateOptions::default() });
     let lines: Vec<&str> = out.lines().collect();
     let wanted = format!("F{}", 2.5 * report.arc_lines as f64);
     let count = report.arc_lines as usize;
@@ -210,9 +210,9 @@ fn under_inverse_time_every_line_has_its_share() {
 fn a_split_move_leaves_less_between_its_ends() {
     let calibrated = erroneous("ac_table_tilting", 20.0);
     let text = "G21 G90 G0 X-200 Y-200 Z5 A20 C-170\nG1 X250 Y200 Z60 A80 C170 F900 M5\n";
-    let (_, whole) = run(&calibrated, text, &Options::default());
+    let (_, whole) = run(&calibrated, text, &CompensateOptions::default());
     assert!(whole.largest_mid_line_m.value > 5e-5, "{whole:?}");
-    let options = Options { split: Some(1e-5), decimals: Some(4), ..Options::default() };
+    let options = CompensateOptions { split: Some(1e-5), decimals: Some(4), ..CompensateOptions::default() };
     let (out, split) = run(&calibrated, text, &options);
     assert_eq!(split.split_moves, 1);
     assert!(split.largest_mid_line_m.value < 1.5e-5, "{:?}", split.largest_mid_line_m);
@@ -228,7 +228,7 @@ fn a_split_move_leaves_less_between_its_ends() {
 #[test]
 fn frames_compose() {
     let calibrated = erroneous("bc_table_tilting", 1.0);
-    let options = Options { decimals: Some(6), ..Options::default() };
+    let options = CompensateOptions { decimals: Some(6), ..CompensateOptions::default() };
     let plain = "G710 G90\nG0 X10 Y-20 Z30 B30 C40\nTRAORI\nG1 X60 Y35 Z12\n";
     let framed =
         "G710 G90\nG0 X10 Y-20 Z30 B30 C40\nTRAORI\nTRANS X10 Y5\nAROT Z90\nATRANS Z2\nG1 X30 Y-50 Z10\n";
@@ -255,7 +255,7 @@ fn frames_compose() {
 #[test]
 fn offsets_tools_and_machine_zero_enter_the_correction() {
     let calibrated = erroneous("bc_head_table", 1.0);
-    let options = Options { decimals: Some(6), ..Options::default() };
+    let options = CompensateOptions { decimals: Some(6), ..CompensateOptions::default() };
     let setup = r#"Setup(zero: {"X": 7}, tools: {"4": 90}, work_offsets: {
         "G54": {"X": 107, "Z": -30, "C": 25}, "G55": {"X": 57, "Y": 10, "Z": -30, "C": 25}})"#;
     let one = "G54 T4 M6\nG43 H4\nG0 X10 Y0 Z20 B30 C15\n";
@@ -281,7 +281,7 @@ fn offsets_tools_and_machine_zero_enter_the_correction() {
 fn places_of_the_machine_stay() {
     let calibrated = erroneous("bc_table_tilting", 1.0);
     let text = "G90 G53 G0 Z300\nG53 G0 X-100 Y50\nG0 B20 C10\nG0 X1 Y2 Z30\nG28 Z0\nG0 X5\n";
-    let (out, report) = run(&calibrated, text, &Options::default());
+    let (out, report) = run(&calibrated, text, &CompensateOptions::default());
     let lines: Vec<&str> = out.lines().collect();
     assert_eq!(lines[..2], text.lines().collect::<Vec<_>>()[..2]);
     assert!(lines[2].starts_with("G0 B") && !lines[2].contains('X'), "{out}");
@@ -296,7 +296,7 @@ fn drilling_cycles_are_corrected_in_their_plane() {
     let (out, report) = run(
         &calibrated,
         "G90 G0 X100 Y200 Z50\nG81 X100 Y200 Z-12 R2 F100\nX300\nG80\n",
-        &Options::default(),
+        &CompensateOptions::default(),
     );
     assert_eq!(report.cycles, 2);
     let lines: Vec<&str> = out.lines().collect();
@@ -311,7 +311,7 @@ fn other_controls_are_written_in_their_own_way() {
     let heidenhain = "0 BEGIN PGM T MM\n1 L X+0,5 Y-10 Z+20 A+40 C+0 R0 FMAX M3\n2 L X+30 F500\n3 L IY-5,25 IC+10\n4 M30\n5 END PGM T MM\n";
     let siemens = "G710 G90\nN10 G0 X=0.5 Y-10 Z20 A=AC(40) C=DC(0)\nN20 G1 X=IC(29.5) F500\nN30 Y=IC(-5.25) C=ACP(10)\nM30\n";
     for text in [heidenhain, siemens] {
-        let (out, report) = run(&calibrated, text, &Options::default());
+        let (out, report) = run(&calibrated, text, &CompensateOptions::default());
         assert_eq!(report.moves, 3);
         let (meant, sent) = (targets(text, &AXES), targets(&out, &AXES));
         for (meant, sent) in meant.iter().zip(&sent) {
@@ -322,12 +322,12 @@ fn other_controls_are_written_in_their_own_way() {
         }
         assert!(out.contains("M30\n") && out.lines().count() == text.lines().count(), "{out}");
     }
-    let (out, _) = run(&calibrated, heidenhain, &Options::default());
+    let (out, _) = run(&calibrated, heidenhain, &CompensateOptions::default());
     assert!(
         out.contains("L X+29,996 Y-9,768 F500") && out.contains(" R0 FMAX M3") && out.contains("IC+"),
         "{out}"
     );
-    let (out, _) = run(&calibrated, siemens, &Options::default());
+    let (out, _) = run(&calibrated, siemens, &CompensateOptions::default());
     assert!(out.contains("X=IC(29.") && out.contains("A=AC(") && out.contains("C=DC("), "{out}");
 }
 
@@ -337,7 +337,7 @@ fn out_of_travel_and_singular_blocks_are_told_by_line() {
     let (_, report) = run(
         &calibrated,
         "G90 G0 X0 Y0 Z0 A0 C0\nG0 A30\nG0 X350 Y400\nG0 X-550 Y-500\n",
-        &Options::default(),
+        &CompensateOptions::default(),
     );
     assert!(report.singular.count == 1 && report.singular.first[0].line == 1, "{:?}", report.singular);
     assert!(report.out_of_travel.count >= 1, "{:?}", report.out_of_travel);
@@ -349,17 +349,17 @@ fn a_sub_program_with_one_context_is_corrected_once() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let body = "G1 X10. Y5. Z-2. A20. C30. F200\nX40.\nG0 Z20.\n";
     let inline = format!("G90 G0 X0. Y0. Z20. A20. C30.\n{body}G0 X0. Y0. Z20.\n{body}M30\n");
-    let (flat, _) = run(&calibrated, &inline, &Options::default());
+    let (flat, _) = run(&calibrated, &inline, &CompensateOptions::default());
     let called = format!(
         "%\nO0007\nG90 G0 X0. Y0. Z20. A20. C30.\nM98 P100\nG0 X0. Y0. Z20.\nM98 P100\nM30\nO0100 (pocket)\n{body}M99\n%\n"
     );
-    let (out, _) = run(&calibrated, &called, &Options::default());
+    let (out, _) = run(&calibrated, &called, &CompensateOptions::default());
     for line in flat.lines().skip(1).take(3) {
         assert!(out.contains(line), "{line}\n{out}");
     }
     let linuxcnc =
         format!("o<pocket> sub\n{body}o<pocket> endsub\nG90 G0 X0. Y0. Z20. A20. C30.\no<pocket> call\nM2\n");
-    let (out, _) = run(&calibrated, &linuxcnc, &Options::default());
+    let (out, _) = run(&calibrated, &linuxcnc, &CompensateOptions::default());
     for line in flat.lines().skip(1).take(3) {
         assert!(out.contains(line), "{line}\n{out}");
     }
@@ -376,7 +376,7 @@ fn a_sub_program_with_one_context_is_corrected_once() {
 fn errors_below_the_written_digits_leave_the_program_alone() {
     let calibrated = erroneous("ac_table_tilting", 1e-5);
     let text = "G21 G90\nG0 X1.5 Y-2. Z+3 A10. C20\nG91 G1 X-.001 F9\nG3 X10 Y10 I10 (arc)\nG90 G1 X007.0\n";
-    assert_eq!(run(&calibrated, text, &Options::default()).0, text);
+    assert_eq!(run(&calibrated, text, &CompensateOptions::default()).0, text);
 }
 
 #[test]
@@ -384,7 +384,7 @@ fn a_program_without_motion_comes_back() {
     let calibrated = erroneous("ac_table_tilting", 10.0);
     let text =
         "%\r\nO1 (no motion)\r\nG21 G90 G94 S1000 M3\r\n(X1 Y2)\r\n\r\nG4 P1.5\r\n#5=[1+2]\r\nM5\r\nM30\r\n%";
-    assert_eq!(run(&calibrated, text, &Options::default()).0, text);
+    assert_eq!(run(&calibrated, text, &CompensateOptions::default()).0, text);
 }
 
 #[test]
@@ -396,7 +396,7 @@ fn every_bad_program_has_a_message_and_a_mend() {
         .collect();
     files.sort();
     let calibrated = erroneous("ac_table_tilting", 1.0);
-    let options = Options::default();
+    let options = CompensateOptions::default();
     let lines: Vec<String> = files
         .into_iter()
         .map(|path| {
@@ -426,7 +426,7 @@ mod data_sets {
         for name in ["keychain", "axis_cross"] {
             let path = common::data(&format!("data/spinner-u5-nc/{name}.mpf"));
             let text = std::fs::read_to_string(path).expect("readable");
-            let options = Options { arcs: Some(5e-6), ..Options::default() };
+            let options = CompensateOptions { arcs: Some(5e-6), ..CompensateOptions::default() };
             let (out, report) = with_setup(&calibrated, &text, setup, &options);
             assert!(report.split_arcs > 50 && report.largest_arc_m.value <= 5e-6, "{name}: {report:?}");
             assert!(report.largest_left_m.value < 2e-6, "{name}: {:?}", report.largest_left_m);
@@ -445,7 +445,7 @@ fn an_arc_names_the_axes_that_it_needs_or_is_refused() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let (machine, actual) = (calibrated.machine(), calibrated.chain());
     let text = "G21 G90\nG0 X30 Y0 A40 C10\nG1 X31 F800\nX30\nG3 X0 Y30 I-30 J0 F800\n";
-    let options = Options { arcs: Some(1e-5), ..Options::default() };
+    let options = CompensateOptions { arcs: Some(1e-5), ..CompensateOptions::default() };
     // Z stands somewhere, and no word says where.
     let refused =
         compensate_text(&calibrated, "part.nc", text, &Setup::default(), &options).expect_err("no Z");

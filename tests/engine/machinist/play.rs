@@ -53,7 +53,7 @@ fn with_play(machine: &Machine, rotary: &[usize], seed: u64) -> (Plant, Vec<Stri
     let measured =
         Recording::from_bytes("rec.csv", texts[0].as_bytes(), machine).unwrap_or_else(|e| panic!("{e}"));
     // The path's steps are fine where an axis turns round.
-    let model = Model {
+    let model = ErrorModel {
         varying: Varying { directions: Some(Directions::new(rotary.to_vec())), terms: Vec::new() },
         dead_bands: vec![Some(1e-7); 5],
         ..ErrorModel::default()
@@ -81,7 +81,7 @@ fn a_machine_with_play_cuts_better_when_its_program_is_corrected_piece_by_piece(
             let (text, setup) = (program(&machine, &path, tcp), setup(&machine, tcp));
             let before = text.lines().take_while(|line| !line.starts_with('N')).count();
             let correct = |model| {
-                compensate_text(model, "path.nc", &text, &setup, &Options::default())
+                compensate_text(model, "path.nc", &text, &setup, &CompensateOptions::default())
                     .unwrap_or_else(|e| panic!("{name}: {e}"))
             };
             let ((by_pieces, report), (by_constant, steady)) = (correct(&pieces), correct(&constant));
@@ -127,7 +127,7 @@ fn an_axis_that_moves_only_once_is_corrected_on_the_side_that_it_comes_to() {
     let of = |text: &str, start: Option<&str>| {
         let setup = start.map_or_else(|| "Setup()".to_string(), |start| format!("Setup(start: {{{start}}})"));
         let setup = Setup::parse("setup.ron", &setup).expect("readable");
-        let (out, report) = compensate_text(&pieces, "part.nc", text, &setup, &Options::default())
+        let (out, report) = compensate_text(&pieces, "part.nc", text, &setup, &CompensateOptions::default())
             .unwrap_or_else(|e| panic!("{e}"));
         (out, report)
     };

@@ -68,7 +68,7 @@ proptest! {
     fn a_nominal_machine_gives_every_byte_back(blocks in prop::collection::vec("\\PC{0,30}\n?", 0..20)) {
         let nominal = CalibratedMachine::nominal(machine("ac_table_tilting"));
         let text = blocks.concat();
-        let (out, _) = run(&nominal, &text, &Options::default());
+        let (out, _) = run(&nominal, &text, &CompensateOptions::default());
         prop_assert_eq!(out, text);
     }
 
@@ -76,7 +76,7 @@ proptest! {
     fn nothing_but_axis_words_changes(blocks in prop::collection::vec(block(), 1..40)) {
         let calibrated = erroneous("ac_table_tilting", 1.0);
         let text = format!("G90 G0 X0 Y0 Z0 A30 C0\n{}", blocks.concat());
-        let (out, report) = run(&calibrated, &text, &Options::default());
+        let (out, report) = run(&calibrated, &text, &CompensateOptions::default());
         prop_assert_eq!(without_axis_words(&out), without_axis_words(&text));
         prop_assert_eq!(report.blocks as usize, text.lines().count());
     }
@@ -85,7 +85,7 @@ proptest! {
     fn every_end_of_a_move_is_where_the_program_means_it(blocks in prop::collection::vec(block(), 1..30)) {
         let calibrated = erroneous("ac_table_tilting", 1.0);
         let text = format!("G90 G0 X0 Y0 Z0 A30 C0\n{}", blocks.concat());
-        let (out, report) = run(&calibrated, &text, &Options::default());
+        let (out, report) = run(&calibrated, &text, &CompensateOptions::default());
         let (machine, actual) = (calibrated.machine(), calibrated.chain());
         let (meant, sent) = (targets(&text, &AXES), targets(&out, &AXES));
         prop_assert_eq!(meant.len(), sent.len());
@@ -98,7 +98,7 @@ proptest! {
     fn any_text_is_corrected_or_refused(blocks in prop::collection::vec("\\PC{0,20}", 0..12)) {
         let calibrated = erroneous("bc_table_tilting", 1.0);
         let setup = Setup::default();
-        let options = Options { arcs: Some(0.05), split: Some(0.05), ..Options::default() };
+        let options = CompensateOptions { arcs: Some(0.05), split: Some(0.05), ..CompensateOptions::default() };
         if let Err(error) = compensate_text(&calibrated, "any.nc", blocks.join("\n"), &setup, &options) {
             prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
         }
@@ -113,7 +113,7 @@ proptest! {
     ]), 0..60)) {
         let calibrated = erroneous("bc_table_tilting", 1.0);
         let setup = Setup::parse("s.ron", r#"Setup(tools: {"1": 50}, work_offsets: {"G54": {"X": 3}})"#).expect("a set-up");
-        let options = Options { arcs: Some(0.05), split: Some(0.05), ..Options::default() };
+        let options = CompensateOptions { arcs: Some(0.05), split: Some(0.05), ..CompensateOptions::default() };
         if let Err(error) = compensate_text(&calibrated, "any.nc", tokens.join(" "), &setup, &options) {
             prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
         }

@@ -40,19 +40,19 @@ fn what_is_written_is_read_with_the_same_moves() {
     }
     text.push_str("G93\nG1 X3 A10 F30\nG94\nM2\n%\n");
     let setup = r#"Setup(tools: {"1": 40}, work_offsets: {"G54": {"Z": -40}})"#;
-    let (out, _) = with_setup(&calibrated, &text, setup, &Options::default());
+    let (out, _) = with_setup(&calibrated, &text, setup, &CompensateOptions::default());
     let before = canonical_moves(&text);
     assert_eq!(canonical_moves(&out), before);
     assert!(before.0 > 390);
     // With arcs there are as many lines as the report says.
     let arcs = "%\nG21 G90 G17 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z10 A20 C0\nG2 X20 Y0 I10 J0 F300\nG3 X20 Y0 Z8 I-10 J5 P2\nG18 G2 X30 Z8 R8\nG19 G3 Y8 Z16 K8 J0\nG1 X1\nM2\n%\n";
-    let options = Options { arcs: Some(5e-6), ..Options::default() };
+    let options = CompensateOptions { arcs: Some(5e-6), ..CompensateOptions::default() };
     let (out, report) = with_setup(&calibrated, arcs, setup, &options);
     assert_eq!(report.split_arcs, 4);
     assert_eq!(canonical_moves(arcs), (2, 4));
     assert_eq!(canonical_moves(&out), (2 + report.arc_lines as usize, 0));
     // Sub-programs.
     let sub = "o100 sub\nG1 X10. Y5. Z-2. F200\nX40.\nG0 Z20.\no100 endsub\nG21 G90 G54\nT1 M6\nG43 H1\nG0 X0. Y0. Z20. A20. C30.\no100 call\nM2\n";
-    let (out, _) = with_setup(&calibrated, sub, setup, &Options::default());
+    let (out, _) = with_setup(&calibrated, sub, setup, &CompensateOptions::default());
     assert_eq!(canonical_moves(&out), canonical_moves(sub));
 }

@@ -55,7 +55,7 @@ fn the_step_at_a_reversal_is_told_with_its_line() {
         "part.nc",
         text.as_bytes(),
         &Setup::default(),
-        &Options::default(),
+        &CompensateOptions::default(),
     )
     .unwrap_or_else(|e| panic!("{e}"));
     let lines: Vec<usize> = report.reversals.first.iter().map(|r| r.line).collect();
@@ -84,7 +84,7 @@ fn with_play() -> (Machine, TwoPieces, String) {
 
 #[test]
 fn the_first_direction_of_an_axis_follows_from_where_it_starts_or_from_its_first_known_way() {
-    let options = Options { arcs: Some(1e-3), ..Options::default() };
+    let options = CompensateOptions { arcs: Some(1e-3), ..CompensateOptions::default() };
     // By set-up and program (@: the axis): thousandths that are added to its words in turn, and lines with an unknown way.
     let cases: [(&str, &str, &[i64], &[usize]); 9] = [
         // Forward from the start, and from the other side.

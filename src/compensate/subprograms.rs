@@ -5,44 +5,42 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::Write;
 
 use super::fault::CompensateFault;
-use super::follower::{Follower, line_text, put, put_bytes, refuse};
+use super::interpreter::Interpreter;
+use super::output::{put, put_bytes};
+use super::refusal::refuse;
 use crate::error::Result;
-use crate::nc::{Block, Dialect, Kind};
+use crate::nc::{Block, Dialect};
 
 /// Most levels of calls.
 const DEEPEST: usize = 10;
 /// Most times that one call repeats its sub-program.
 const MOST_TIMES: f64 = 10_000.0;
 
-/// What a call is called in messages and in the set-up: `M98 P1000`, `L6`, `CYCLE81`.
-pub(super) fn name_of(block: &Block) -> String {
-    let word = |address: &str| block.words().iter().find(|w| w.address == address);
-    let text = |address: &str| word(address).map(|w| block.text(&w.span).to_ascii_uppercase());
-    let callers = ["M98", "M198", "G65", "G66", "G66.1"];
-    let calling = block.words().iter().map(|w| block.text(&w.span).to_ascii_uppercase());
-    if let Some(code) = calling.into_iter().find(|t| callers.contains(&t.as_str())) {
-        return text("P").map_or(code.clone(), |p| format!("{code} {p}"));
-    }
-    if let Some(l) = text("L") {
-        return l;
-    }
-    let named = block.tokens().iter().find(|t| matches!(t.kind, Kind::Name | Kind::Call));
-    named.map_or_else(|| line_text(block), |t| block.name(t))
+/// Whatever follows a program, block by block in the order in which they run.
+pub(super) trait Follow<'a> {
+    /// What is known of the program behind the last block.
+    fn program(&self) -> &Interpreter<'a>;
+
+    /// Follows a block and writes what comes of it.
+    ///
+    /// # Errors
+    /// [`Error::Input`](crate::error::Error::Input) where it cannot be read or followed.
+    fn block(&mut self, block: &mut Block, out: &mut dyn Write) -> Result<()>;
 }
 
 /// Sub-programs of a file: their lines, and what they say once corrected.
 #[derive(Default)]
-pub(super) struct Calls {
+pub(super) struct SubPrograms {
     bodies: BTreeMap<String, Vec<(usize, Vec<u8>)>>,
     /// Of lines of sub-programs.
     written: HashMap<usize, Vec<u8>>,
     /// Whether what is written is being found, and not yet put out.
-    pub collecting: bool,
+    collecting: bool,
 }
 
 /// What a line is for sub-programs.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Mark {
+enum Mark {
     /// Nothing.
     Line,
     /// A sub-program begins, `O1000` or `o100 sub`; ends, `M99` or `o100 endsub`.
@@ -74,7 +72,7 @@ fn o_word(text: &str) -> Option<(String, String)> {
 }
 
 /// What a line is for sub-programs.
-pub(super) fn mark(block: &Block, dialect: Dialect) -> Mark {
+fn mark(block: &Block, dialect: Dialect) -> Mark {
     if dialect != Dialect::Rs274 {
         return Mark::Line;
     }
@@ -133,11 +131,18 @@ impl Bounds {
     }
 }
 
-impl Calls {
+impl SubPrograms {
+    /// A line of the sub-program `name`.
     pub fn add(&mut self, name: &str, block: &Block) {
         self.bodies.entry(name.to_string()).or_default().push((block.line(), block.bytes().to_vec()));
     }
 
+    /// From here on what is written is found, and not yet put out; or the other way round.
+    pub fn collect(&mut self, collecting: bool) {
+        self.collecting = collecting;
+    }
+
+    /// Whether the file has no sub-programs.
     pub fn is_empty(&self) -> bool {
         self.bodies.is_empty()
     }
@@ -151,15 +156,18 @@ impl Calls {
     }
 
     /// Follows a block; where it calls a sub-program of the file, its blocks as well.
-    pub fn block(
+    pub fn block<'a>(
         &mut self,
-        follower: &mut Follower,
+        follower: &mut dyn Follow<'a>,
         block: &mut Block,
         deep: usize,
         out: &mut dyn Write,
     ) -> Result<()> {
-        let (name, times) = match mark(block, follower.dialect) {
-            Mark::Call(name, times) if self.bodies.contains_key(&name) && !follower.ended => (name, times),
+        let dialect = follower.program().dialect();
+        let (name, times) = match mark(block, dialect) {
+            Mark::Call(name, times) if self.bodies.contains_key(&name) && !follower.program().ended() => {
+                (name, times)
+            }
             Mark::Begin(_) | Mark::End if deep > 0 || !self.bodies.is_empty() => return put(block, out),
             Mark::Begin(name) if !name.is_empty() => {
                 let text = String::from_utf8_lossy(block.bytes()).into_owned();
@@ -177,7 +185,7 @@ impl Calls {
         let body = self.bodies[&name].clone();
         for _ in 0..times {
             for (line, bytes) in &body {
-                let mut inner = Block::of_file(block.file(), *line, bytes.clone(), follower.dialect);
+                let mut inner = Block::of_file(block.file(), *line, bytes.clone(), dialect);
                 let mut written = Vec::new();
                 self.block(follower, &mut inner, deep + 1, &mut written)?;
                 if !self.collecting {

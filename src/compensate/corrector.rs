@@ -1,0 +1,262 @@
+//! The corrector: from a meant position to corrected joint commands, and to the numbers that say so,
+//! `docs/compensate.md` (C9) to (C11).
+
+use super::control::Control;
+use super::interpreter::Interpreter;
+use super::model::Model;
+use super::position::Position;
+use super::style::{Style, plain};
+use super::tip_error::TipError;
+use crate::calibration::LeftOut;
+use crate::chain::Chain;
+use crate::inverse::{Inverse, Mode, Solution};
+use crate::lie::Twist;
+use crate::machine::{JointKind, Machine};
+use crate::nc::{Block, Dialect, How, Number, Word};
+
+/// A number to write for an axis.
+pub(super) struct AxisNumber {
+    axis: usize,
+    text: String,
+}
+
+impl AxisNumber {
+    /// Index of the axis.
+    pub fn axis(&self) -> usize {
+        self.axis
+    }
+
+    /// Programmed units, with a decimal point.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}
+
+/// What a position needs.
+pub(super) struct Correction {
+    numbers: Vec<AxisNumber>,
+    written: Position,
+    solution: Solution,
+}
+
+impl Correction {
+    /// Numbers that differ from what stands there.
+    pub fn numbers(&self) -> &[AxisNumber] {
+        &self.numbers
+    }
+
+    /// Where the control takes the machine by them.
+    pub fn written(&self) -> &Position {
+        &self.written
+    }
+
+    /// How the inverse came out, before rounding.
+    pub fn solution(&self) -> &Solution {
+        &self.solution
+    }
+
+    /// Only the numbers of these axes, by axis.
+    pub fn keep(&mut self, axes: &[bool]) {
+        self.numbers.retain(|n| axes[n.axis]);
+    }
+
+    /// Where the control takes the machine, when nothing else is asked.
+    pub fn into_written(self) -> Position {
+        self.written
+    }
+}
+
+/// A position corrected, before rounding.
+struct Corrected {
+    meant: Vec<f64>,
+    sent: Vec<f64>,
+    /// The piece that it belongs to.
+    piece: usize,
+}
+
+/// A machine with its errors, and the inverse of it.
+pub(super) struct Corrector<'a> {
+    machine: &'a Machine,
+    model: &'a mut dyn Model,
+    inverse: Inverse<'a>,
+    /// For the linear joints alone.
+    slides: Inverse<'a>,
+    last: Option<Corrected>,
+}
+
+impl<'a> Corrector<'a> {
+    /// `mode`: what counts, where it is not what the machine has joints for. `first`: direction of the first motion of each
+    /// command, 0 where that is not known.
+    pub fn new(machine: &'a Machine, model: &'a mut dyn Model, mode: Option<Mode>, first: &[i8]) -> Self {
+        let inverse = Inverse::new(machine);
+        let inverse = mode.map_or(inverse.clone(), |mode| inverse.with_mode(mode));
+        let slides = inverse.with_mode(Mode::Position);
+        model.restart(first);
+        Corrector { machine, model, inverse, slides, last: None }
+    }
+
+    pub fn machine(&self) -> &'a Machine {
+        self.machine
+    }
+
+    /// The machine's errors where it stands.
+    pub fn model(&self) -> &dyn Model {
+        self.model
+    }
+
+    /// Whether a position has been corrected since the machine was told to go on.
+    pub fn has_last(&self) -> bool {
+        self.last.is_some()
+    }
+
+    /// Tells the model where the machine goes, and by which ways.
+    pub fn advance(&mut self, q: &[f64], ways: &[bool]) {
+        self.model.advance(q, ways);
+    }
+
+    /// By how much the last position would be corrected otherwise by what holds now; `None` where the piece is the same.
+    pub fn step(&mut self, program: &Interpreter) -> Option<TipError> {
+        let last = self.last.take()?;
+        if last.piece == self.model.piece() {
+            return None;
+        }
+        let again = self.solve(&self.model.chain_at(&last.meant), program, &last.meant);
+        let control = program.control();
+        Some(TipError::between(control.tip_pose(&last.sent), control.tip_pose(&again.commands)))
+    }
+
+    /// What the model says is wrong where the program means `meant` and the joints are sent to `sent`.
+    pub fn error(&self, control: &Control, sent: &[f64], meant: &[f64]) -> TipError {
+        let goal = control.goal(meant);
+        TipError::between(self.model.chain_at(meant).w_from_t(sent) * goal.t_from_tip, goal.w_from_tip)
+    }
+
+    /// The joint commands that bring tip and axis of a machine with this chain where `meant` has them.
+    pub fn solve(&self, chain: &Chain<f64>, program: &Interpreter, meant: &[f64]) -> Solution {
+        self.solve_with(chain, program, meant, &program.free())
+    }
+
+    /// As [`Corrector::solve`], with these commands free.
+    pub fn solve_with(
+        &self,
+        chain: &Chain<f64>,
+        program: &Interpreter,
+        meant: &[f64],
+        free: &[bool],
+    ) -> Solution {
+        self.inverse.solve(chain, &program.control().goal(meant), meant, free)
+    }
+
+    /// The joint commands that bring tip and axis of the actual machine where the program means them, and the
+    /// words that say so. `q`: as meant; the model stands there already. `block` will carry them in its `words`, by axis.
+    pub fn correct(
+        &mut self,
+        program: &Interpreter,
+        style: &Style,
+        q: &[f64],
+        block: Option<&Block>,
+        words: &[Option<usize>],
+    ) -> Correction {
+        let control = program.control();
+        let free = program.free();
+        let chain = self.model.chain_at(q);
+        let solution = self.solve_with(&chain, program, q, &free);
+        let mut exact = solution.commands.clone();
+        let mut numbers = Vec::new();
+        let mut coordinates = program.written().program().to_vec();
+        let word = |i: usize| block.zip(words.get(i).copied().flatten()).map(|(b, w)| &b.words()[w]);
+        let rotary = |i: usize| control.axes()[i].is_rotary();
+        // Angles first; lengths then make up for what rounding does to them.
+        let turned = control.program(&exact, &coordinates);
+        for i in (0..coordinates.len()).filter(|i| rotary(*i)) {
+            coordinates[i] = number(program, style, i, turned[i], word(i), &mut numbers);
+        }
+        if (0..coordinates.len()).any(rotary) {
+            let mut rounded = turned;
+            for i in (0..coordinates.len()).filter(|i| rotary(*i)) {
+                rounded[i] = coordinates[i];
+            }
+            if let Some(there) = control.joints(&rounded, &exact) {
+                let slides: Vec<bool> = (0..free.len()).map(|c| free[c] && self.is_prismatic(c)).collect();
+                if slides.iter().filter(|s| **s).count() == 3 {
+                    exact = self.slides.solve(&chain, &control.goal(q), &there, &slides).commands;
+                } else {
+                    exact = there;
+                }
+            }
+        }
+        let moved = control.program(&exact, &coordinates);
+        for i in (0..coordinates.len()).filter(|i| !rotary(*i)) {
+            coordinates[i] = number(program, style, i, moved[i], word(i), &mut numbers);
+        }
+        drop(chain);
+        let (meant, sent, piece) = (q.to_vec(), solution.commands.clone(), self.model.piece());
+        self.last = Some(Corrected { meant, sent, piece });
+        let q = control.joints(&coordinates, &exact).unwrap_or(exact);
+        Correction { numbers, written: Position::new(q, coordinates), solution }
+    }
+
+    fn is_prismatic(&self, command: usize) -> bool {
+        self.machine.command_joint(command).kind == JointKind::Prismatic
+    }
+
+    /// Deviations that no recording has shown, as [`Model::unseen`].
+    pub fn unseen(&self) -> Option<&[Vec<Twist<f64>>]> {
+        self.model.unseen()
+    }
+
+    /// Effects that are not corrected, and those that are corrected in one state.
+    pub fn reservations(&self) -> (&[LeftOut], &[LeftOut]) {
+        (self.model.left_out(), self.model.held())
+    }
+}
+
+/// The number to write for an axis that should stand at `wanted` (program coordinates, m or rad), if
+/// another one than there is; returns where it then stands.
+fn number(
+    program: &Interpreter,
+    style: &Style,
+    axis: usize,
+    wanted: f64,
+    word: Option<&Word>,
+    numbers: &mut Vec<AxisNumber>,
+) -> f64 {
+    let control = program.control();
+    let now = program.written().program()[axis];
+    let how = program.meaning(word.map_or(How::Modal, |w| w.how));
+    let mut value = control.programmed(axis, wanted);
+    let from = control.programmed(axis, now);
+    match how {
+        How::Incremental => value -= from,
+        How::Shortest | How::Positive | How::Negative => value = value.rem_euclid(360.0),
+        _ => {}
+    }
+    let places = style.places(control, axis).max(word.and_then(plain).map_or(0, |n| n.decimals));
+    let half = 0.500_001 * 10f64.powi(-(places as i32));
+    let stands = |number: f64| match how {
+        How::Incremental => control.si(axis, from + number),
+        How::Shortest | How::Positive | How::Negative => wanted + control.si(axis, number - value),
+        _ => control.si(axis, number),
+    };
+    let (text, dialect) = match word.and_then(plain) {
+        Some(number) => {
+            if (value - number.value).abs() <= half {
+                return stands(number.value);
+            }
+            (number.write_like(value, Some(places)), Dialect::Heidenhain)
+        }
+        None => {
+            let same = match how {
+                How::Incremental => value.abs() <= half,
+                _ => (value - from).abs() <= half,
+            };
+            if same || !program.places().is_placed(axis) || control.axes()[axis].command().is_none() {
+                return now;
+            }
+            (format!("{value:.places$}"), Dialect::Rs274)
+        }
+    };
+    let Some(written) = Number::parse(text.as_bytes(), dialect) else { return now };
+    numbers.push(AxisNumber { axis, text });
+    stands(written.value)
+}

@@ -1,0 +1,48 @@
+//! A drilling cycle: its place is corrected in the plane, its depths and its angles stay.
+
+use std::io::Write;
+
+use super::fault::CompensateFault;
+use super::output::put;
+use super::pass::Pass;
+use super::position::Position;
+use super::refusal::{line_text, refuse};
+use crate::error::Result;
+use crate::nc::{Block, Distance, Motion};
+
+/// Corrects the place of a cycle, `target` (program coordinates, m or rad), and writes it.
+pub(super) fn write(
+    pass: &mut Pass,
+    block: &mut Block,
+    motion: &Motion,
+    mut target: Vec<f64>,
+    out: &mut dyn Write,
+) -> Result<()> {
+    let line = block.line();
+    let repeated = block.words().iter().any(|w| matches!(w.address.as_str(), "L" | "K"));
+    if pass.program().modes().distance == Some(Distance::Incremental) || repeated {
+        let what = format!("the cycle `{}`", line_text(block));
+        return refuse(block, 0, CompensateFault::OtherMotion { what });
+    }
+    let in_plane = pass.program().control().in_plane();
+    let beside: Vec<usize> = (0..target.len()).filter(|i| !in_plane[*i]).collect();
+    for i in &beside {
+        target[*i] = pass.program().meant().program()[*i];
+    }
+    let q = pass.program().joints(block, &target)?;
+    pass.advance(line, &q);
+    let mut correction = pass.correct(line, &q, Some(block), &motion.words);
+    correction.keep(&in_plane);
+    let mut coordinates = correction.written().program().to_vec();
+    for i in &beside {
+        coordinates[*i] = pass.program().written().program()[*i];
+    }
+    let written = Position::new(pass.program().joints(block, &coordinates)?, coordinates);
+    pass.put_words(block, motion, &correction)?;
+    let left = pass.corrector().error(pass.program().control(), written.q(), &q);
+    pass.report().largest_cycle_m.take(left.m(), line);
+    pass.report().cycles += 1;
+    pass.put_in_force(motion.kind);
+    pass.arrive_behind_cycle(Position::new(q, target), written);
+    put(block, out)
+}

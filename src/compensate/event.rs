@@ -1,0 +1,29 @@
+//! What a block makes happen, in the order in which it does.
+
+use crate::nc::{Motion, MotionKind};
+
+/// One thing that a block makes happen.
+#[derive(Clone, Debug)]
+pub(super) enum Event {
+    /// Lengths are written in another unit from here on.
+    Units,
+    /// The machine goes to a place of its own, a reference point or one in its own frame.
+    Sent {
+        /// Joint commands there, m or rad.
+        q: Vec<f64>,
+        /// By command: whether its way there is known.
+        ways: Vec<bool>,
+        /// The motion that the block puts into force, if it does.
+        kind: Option<MotionKind>,
+    },
+    /// A drilling cycle is called that leaves the axes of its plane where they are.
+    Drilled,
+    /// A move to program coordinates. Whoever follows it tells the interpreter where it ends.
+    Move {
+        motion: Motion,
+        /// Where it ends, by axis, m or rad.
+        target: Vec<f64>,
+        /// Whether a cycle runs there.
+        drills: bool,
+    },
+}

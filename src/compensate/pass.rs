@@ -1,0 +1,240 @@
+//! One pass over a program: where it is, how it is corrected, and what there is to tell of it.
+
+use std::io::Write;
+
+use super::corrector::{Correction, Corrector};
+use super::event::Event;
+use super::interpreter::Interpreter;
+use super::model::Model;
+use super::motion_word::{first_of, motion_word};
+use super::options::CompensateOptions;
+use super::output::put;
+use super::position::Position;
+use super::report::{OutOfTravel, Report, Reversal, SingularBlock, UnknownWay, Unreached, UnseenPiece};
+use super::style::Style;
+use super::tip_error::TipError;
+use super::unseen::UnseenSums;
+use super::words;
+use crate::error::Result;
+use crate::inverse::{Outcome, Solution};
+use crate::nc::{Block, Motion, MotionKind};
+
+/// A program being corrected.
+pub(super) struct Pass<'a> {
+    program: Interpreter<'a>,
+    corrector: Corrector<'a>,
+    options: &'a CompensateOptions,
+    style: Style,
+    /// Motion in force by what has been written.
+    written_motion: Option<MotionKind>,
+    report: Report,
+    unseen: UnseenSums,
+    /// The last line that went beyond what the calibration has seen.
+    extrapolated: usize,
+}
+
+impl<'a> Pass<'a> {
+    /// From the start of `program`. `first`: direction of the first motion of each command, 0 where that is not known.
+    pub fn new(
+        mut program: Interpreter<'a>,
+        model: &'a mut dyn Model,
+        options: &'a CompensateOptions,
+        first: &[i8],
+    ) -> Self {
+        let machine = program.control().machine();
+        let mut corrector = Corrector::new(machine, model, options.mode, first);
+        let ways = program.take_way();
+        corrector.advance(program.meant().q(), &ways);
+        Pass {
+            program,
+            corrector,
+            options,
+            style: Style::new(options.decimals),
+            written_motion: None,
+            report: Report { machine: machine.name().to_string(), ..Report::default() },
+            unseen: UnseenSums::default(),
+            extrapolated: 0,
+        }
+    }
+
+    pub fn program(&self) -> &Interpreter<'a> {
+        &self.program
+    }
+
+    pub fn corrector(&self) -> &Corrector<'a> {
+        &self.corrector
+    }
+
+    pub fn options(&self) -> &'a CompensateOptions {
+        self.options
+    }
+
+    pub fn style(&self) -> &Style {
+        &self.style
+    }
+
+    /// What there is to tell so far.
+    pub fn report(&mut self) -> &mut Report {
+        &mut self.report
+    }
+
+    /// Follows a block up to its move under program coordinates, which is the caller's; without one the block is written as it is.
+    pub fn begin(&mut self, block: &Block, out: &mut dyn Write) -> Result<Option<(Motion, Vec<f64>, bool)>> {
+        for event in self.program.block(block)? {
+            match event {
+                Event::Units => self.style.forget_lengths(),
+                Event::Drilled => self.report.cycles += 1,
+                Event::Sent { q, ways, kind } => {
+                    self.corrector.advance(&q, &ways);
+                    self.written_motion = kind.or(self.written_motion);
+                    self.report.machine_moves += 1;
+                }
+                // The last thing that a block makes happen.
+                Event::Move { motion, target, drills } => {
+                    self.report.moves += 1;
+                    self.style.read(block, &motion, self.program.control(), self.program.dialect());
+                    return Ok(Some((motion, target, drills)));
+                }
+            }
+        }
+        put(block, out)?;
+        Ok(None)
+    }
+
+    /// Goes to a position that is corrected in this line, or passes it there.
+    pub fn tell(&mut self, line: usize, q: &[f64]) {
+        let ways = self.program.take_way();
+        self.corrector.advance(q, &ways);
+        let (control, places) = (self.program.control(), self.program.places());
+        let is_placed = |command: usize| {
+            let mut axes = control.axes().iter().enumerate();
+            axes.any(|(i, axis)| axis.command().is_some_and(|a| a.0 == command) && places.is_placed(i))
+        };
+        let model = self.corrector.model();
+        let unknown = model.keyed().iter().filter(|c| !ways[**c] && is_placed(**c));
+        for c in unknown {
+            let joint = control.machine().commands()[*c].clone();
+            let side = model.directions()[*c];
+            self.report.unknown_ways.push(UnknownWay { line, joint, side });
+        }
+    }
+
+    /// As [`Pass::tell`]; where that changes the piece, the step of the correction is noted.
+    pub fn advance(&mut self, line: usize, q: &[f64]) {
+        self.tell(line, q);
+        let model = self.corrector.model();
+        if self.extrapolated != line && model.extrapolates(q) {
+            self.extrapolated = line;
+            self.report.extrapolated_moves += 1;
+        }
+        if let Some(piece) = model.unseen_piece() {
+            self.report.unseen_directions.push_once(UnseenPiece { line, piece }, line);
+        }
+        if let Some(step) = self.corrector.step(&self.program) {
+            self.report.largest_reversal_m.take(step.m(), line);
+            self.report.reversals.push(Reversal { line, step_m: step.m(), step_rad: step.rad() });
+        }
+    }
+
+    /// Corrects a position, as [`Corrector::correct`].
+    pub fn correct(
+        &mut self,
+        line: usize,
+        q: &[f64],
+        block: Option<&Block>,
+        words: &[Option<usize>],
+    ) -> Correction {
+        let correction = self.corrector.correct(&self.program, &self.style, q, block, words);
+        self.note(line, correction.solution());
+        correction
+    }
+
+    /// Notes what the inverse could not do.
+    fn note(&mut self, line: usize, solution: &Solution) {
+        let left_rad = solution.angle_left_rad;
+        match solution.outcome {
+            Outcome::OutOfTravel { command, by } => {
+                let joint = self.corrector.machine().commands()[command].clone();
+                self.report.out_of_travel.push_once(OutOfTravel { line, joint, by }, line);
+            }
+            Outcome::Singular { lost_w } => {
+                let lost_w = lost_w.to_array();
+                self.report.singular.push_once(SingularBlock { line, lost_w, left_rad }, line);
+            }
+            Outcome::Unreachable
+                if solution.position_left_m > 1e-9 && self.program.free().iter().all(|f| *f) =>
+            {
+                let left_m = solution.position_left_m;
+                self.report.unreachable.push_once(Unreached { line, left_m, left_rad }, line);
+            }
+            _ => {}
+        }
+    }
+
+    /// Puts the numbers of a correction into a block.
+    pub fn put_words(&mut self, block: &mut Block, motion: &Motion, correction: &Correction) -> Result<()> {
+        let habits = (&self.style, self.program.control());
+        words::put_into(block, &motion.words, correction.numbers(), habits, &mut self.report)
+    }
+
+    /// Writes the block's motion word where what was written before has put another one into force.
+    pub fn restate(&mut self, block: &mut Block, motion: &Motion) -> Result<()> {
+        let arc = match motion.kind {
+            MotionKind::ArcCw => Some("2"),
+            MotionKind::ArcCcw => Some("3"),
+            _ => None,
+        };
+        let differs = self.written_motion.is_some_and(|in_force| in_force != motion.kind);
+        if let Some(code) = arc.filter(|_| differs && motion_word(block).is_none()) {
+            block.insert_before(first_of(block, motion), "G", code)?;
+        }
+        self.put_in_force(motion.kind);
+        Ok(())
+    }
+
+    /// Motion in force behind what has been written.
+    pub fn put_in_force(&mut self, kind: MotionKind) {
+        self.written_motion = Some(kind);
+    }
+
+    /// Takes a corrected position as reached.
+    pub fn arrive(&mut self, line: usize, meant: Position, written: Position) {
+        let control = self.program.control();
+        // Where an axis stands at a place of the machine, the tip is nowhere that matters.
+        if !self.program.places().any_parked() {
+            let left = self.corrector.error(control, written.q(), meant.q());
+            self.report.largest_left_m.take(left.m(), line);
+            self.report.largest_left_rad.take(left.rad(), line);
+        }
+        let correction = TipError::between(control.tip_pose(written.q()), control.tip_pose(meant.q()));
+        self.report.largest_correction_m.take(correction.m(), line);
+        self.report.largest_correction_rad.take(correction.rad(), line);
+        if let Some(patterns) = self.corrector.unseen().filter(|p| !p.is_empty()) {
+            self.unseen.add(control, patterns, written.q());
+        }
+        self.program.arrive(meant, written);
+    }
+
+    /// Takes a place as reached at which a cycle has run.
+    pub fn arrive_behind_cycle(&mut self, meant: Position, written: Position) {
+        self.program.arrive(meant, written);
+        self.program.leave_normal();
+    }
+
+    /// The report of what was followed.
+    pub fn finish(self) -> Report {
+        let mut report = self.report;
+        let machine = self.corrector.machine();
+        report.unseen = self.corrector.unseen().map(|patterns| self.unseen.report(machine, patterns));
+        let (left_out, held) = self.corrector.reservations();
+        (report.left_out, report.held) = (left_out.to_vec(), held.to_vec());
+        if report.moves > 0 {
+            let axes = self.program.control().axes().iter().enumerate();
+            report.never_programmed = axes
+                .filter(|(i, axis)| axis.command().is_some() && !self.program.places().is_named(*i))
+                .map(|(_, axis)| axis.address().to_string())
+                .collect();
+        }
+        report
+    }
+}

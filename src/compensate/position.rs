@@ -1,0 +1,35 @@
+//! A position of a machine: its joints, and what a program calls it.
+
+/// A position, as joints and as program coordinates in the frame in force; m or rad.
+#[derive(Clone, Debug)]
+pub(super) struct Position {
+    q: Vec<f64>,
+    program: Vec<f64>,
+}
+
+impl Position {
+    /// `q`: by command; `program`: by axis.
+    pub fn new(q: Vec<f64>, program: Vec<f64>) -> Self {
+        Position { q, program }
+    }
+
+    /// By command, machine order.
+    pub fn q(&self) -> &[f64] {
+        &self.q
+    }
+
+    /// By axis, in the order of [`Control::axes`](super::control::Control::axes).
+    pub fn program(&self) -> &[f64] {
+        &self.program
+    }
+
+    /// Another place of one joint; what the program calls it stays to be told.
+    pub fn set_joint(&mut self, command: usize, q: f64) {
+        self.q[command] = q;
+    }
+
+    /// The same place under other coordinates.
+    pub fn rename(&mut self, program: Vec<f64>) {
+        self.program = program;
+    }
+}

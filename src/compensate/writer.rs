@@ -1,0 +1,63 @@
+//! The writer: a program goes in block by block and comes out corrected.
+
+use std::io::Write;
+
+use super::curve;
+use super::cycle;
+use super::fault::CompensateFault;
+use super::interpreter::Interpreter;
+use super::model::Model;
+use super::options::CompensateOptions;
+use super::pass::Pass;
+use super::refusal::{line_text, refuse};
+use super::report::Report;
+use super::straight;
+use super::subprograms::Follow;
+use crate::error::Result;
+use crate::nc::{Block, MotionKind};
+
+/// A program that is written as its errors ask for.
+pub(super) struct Writer<'a> {
+    pass: Pass<'a>,
+}
+
+impl<'a> Writer<'a> {
+    /// From the start of `program`; `first` as for [`Pass::new`].
+    pub fn new(
+        program: Interpreter<'a>,
+        model: &'a mut dyn Model,
+        options: &'a CompensateOptions,
+        first: &[i8],
+    ) -> Self {
+        Writer { pass: Pass::new(program, model, options, first) }
+    }
+
+    /// The report of what was written.
+    pub fn finish(self) -> Report {
+        self.pass.finish()
+    }
+}
+
+impl<'a> Follow<'a> for Writer<'a> {
+    fn program(&self) -> &Interpreter<'a> {
+        self.pass.program()
+    }
+
+    fn block(&mut self, block: &mut Block, out: &mut dyn Write) -> Result<()> {
+        let pass = &mut self.pass;
+        let Some((motion, target, drills)) = pass.begin(block, out)? else { return Ok(()) };
+        if drills {
+            return cycle::write(pass, block, &motion, target, out);
+        }
+        match motion.kind {
+            MotionKind::Rapid | MotionKind::Linear | MotionKind::Unstated => {
+                straight::write(pass, block, &motion, target, out)
+            }
+            MotionKind::ArcCw | MotionKind::ArcCcw => curve::write(pass, block, &motion, target, out),
+            MotionKind::Cycle | MotionKind::Other => {
+                let what = format!("the motion `{}`", line_text(block));
+                refuse(block, 0, CompensateFault::OtherMotion { what })
+            }
+        }
+    }
+}

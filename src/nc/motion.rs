@@ -1,0 +1,33 @@
+//! What one block does: where it moves, and what else it sets going.
+
+use super::modes::MotionKind;
+
+/// A block that moves. Lists are in the order of the addresses given to [`State::new`](super::State::new).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Its line, from 1.
+    pub line: usize,
+    /// How it moves.
+    pub kind: MotionKind,
+    /// Where it starts, programmed units; `None` where that is not known.
+    pub start: Vec<Option<f64>>,
+    /// Where it ends, absolute, programmed units, with the axes that the block does not name; `None` where that is not known.
+    pub target: Vec<Option<f64>>,
+    /// Which of [`Block::words`](super::Block::words) gave which axis.
+    pub words: Vec<Option<usize>>,
+    /// Whether `target` is meant in the machine's own frame (`G53`, `SUPA`) for the axes named.
+    pub machine_frame: bool,
+}
+
+/// What one block did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Where it moves, if it does.
+    pub motion: Option<Motion>,
+    /// Coordinates mean something else behind this block: `TRANS`, `AROT`, `G92`, `G52`, `G68`, `G10`, `CYCLE800`, `PLANE`.
+    pub changes_frame: bool,
+    /// It calls a sub-program, macro or cycle that may move.
+    pub calls: bool,
+    /// The next block need not be the next line: `IF`, `GOTO`, `WHILE`, `FN 9`. State is followed in the order of lines.
+    pub jumps: bool,
+}
