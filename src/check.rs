@@ -125,7 +125,7 @@ impl<'a> Case<'a> {
     }
 
     /// The readings as functions of anything: the production code on any scalar.
-    fn readings<S: crate::Scalar>(
+    fn readings<S: crate::scalar::Scalar>(
         &self,
         deviations: &[Twist<S>],
         q: &[S],
@@ -243,7 +243,7 @@ impl<'a> Case<'a> {
     }
 }
 
-fn lift<S: crate::Scalar>(state: &SensorState<f64>, like: S) -> SensorState<S> {
+fn lift<S: crate::scalar::Scalar>(state: &SensorState<f64>, like: S) -> SensorState<S> {
     SensorState {
         tool_point_t: state.tool_point_t.lift(like),
         workpiece_point_w: state.workpiece_point_w.lift(like),

@@ -2,10 +2,10 @@
 //! calibration, and the diagnosis that names the effects.
 
 use crate::calibration::CalibratedMachine;
-use crate::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use crate::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use crate::effects::Library;
 use crate::error::Result;
-use crate::identify::{Fit, CalibrateOptions, calibrate};
+use crate::identify::{CalibrateOptions, Fit, calibrate};
 use crate::lie::{Twist, Vec3};
 use crate::machine::Machine;
 use crate::recording::Recording;

@@ -13,6 +13,7 @@ use crate::machine::{Branch, Dyad, Joint, JointKind, Machine};
 use crate::sensor::{Sensor, SensorState};
 
 /// Everything that `describe` prints. Numbers in SI.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Description {
     /// Name of the machine.
@@ -35,6 +36,7 @@ pub struct Description {
 }
 
 /// One dyad.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DyadDescription {
     /// Frame.
@@ -53,6 +55,7 @@ pub struct DyadDescription {
 }
 
 /// What an instrument identifies.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Identifiable {
     /// `pose`, `position`, `distance`, `distance, length unknown`, `displacement`.

@@ -83,10 +83,20 @@ use rounds::{Case, Told};
 use side_branches::unseen;
 
 /// What a diagnosis is asked.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default)]
 pub struct DiagnoseOptions {
     /// How the constant geometry is identified.
     pub options: CalibrateOptions,
+}
+
+impl DiagnoseOptions {
+    /// The same with another way to identify the constant geometry.
+    #[must_use]
+    pub fn with_options(mut self, options: CalibrateOptions) -> Self {
+        self.options = options;
+        self
+    }
 }
 
 /// Diagnoses what constant geometry leaves over in these recordings.

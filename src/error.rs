@@ -49,6 +49,7 @@ pub trait Fault: std::error::Error + Send + Sync + 'static {
 }
 
 /// A fault that is told in words alone.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}")]
 pub struct Mistake {

@@ -27,7 +27,10 @@ inner! {
     use information::Information;
 }
 pub(crate) use evaluator::{EXTRAS, Evaluator, Moment, Values};
-pub use fit::{BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit, Suspect};
+pub use fit::{
+    BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit,
+    Suspect,
+};
 pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
 pub(crate) use optimum::{optimum, sources};
@@ -58,6 +61,7 @@ pub(crate) use unknowns::{Layout, Role, Unknowns};
 use upright::{Frames, turn_gravity, upright};
 
 /// How to identify.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug)]
 pub struct CalibrateOptions {
     /// The walk to the optimum.
@@ -74,7 +78,31 @@ impl Default for CalibrateOptions {
     }
 }
 
+impl CalibrateOptions {
+    /// The same with another walk to the optimum.
+    #[must_use]
+    pub fn with_solver(mut self, solver: Solver) -> Self {
+        self.solver = solver;
+        self
+    }
+
+    /// The same with another loss.
+    #[must_use]
+    pub fn with_loss(mut self, loss: Loss) -> Self {
+        self.loss = loss;
+        self
+    }
+
+    /// The same with or without the tolerances as a prior.
+    #[must_use]
+    pub fn with_prior(mut self, prior: bool) -> Self {
+        self.prior = prior;
+        self
+    }
+}
+
 /// What to identify besides constant deviations, and from which samples.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default)]
 pub struct ErrorModel {
     /// What deviations depend on.
@@ -88,6 +116,43 @@ pub struct ErrorModel {
     pub error_motions: f64,
     /// Sides of approach that the recordings do not show.
     pub approaches: Vec<Approach>,
+}
+
+impl ErrorModel {
+    /// The same with what deviations depend on besides being constant.
+    #[must_use]
+    pub fn with_varying(mut self, varying: Varying) -> Self {
+        self.varying = varying;
+        self
+    }
+
+    /// The same with dead bands of the directions of travel by command, m or rad; `None`: 1e-5 of the command's range.
+    #[must_use]
+    pub fn with_dead_bands(mut self, dead_bands: Vec<Option<f64>>) -> Self {
+        self.dead_bands = dead_bands;
+        self
+    }
+
+    /// The same with so many samples of each piece, evenly spread; the others judge the result.
+    #[must_use]
+    pub fn with_samples(mut self, samples: u64) -> Self {
+        self.samples = Some(samples);
+        self
+    }
+
+    /// The same with room for smooth error motions of every joint, over the tolerance of its dyad.
+    #[must_use]
+    pub fn with_error_motions(mut self, error_motions: f64) -> Self {
+        self.error_motions = error_motions;
+        self
+    }
+
+    /// The same with sides of approach that the recordings do not show.
+    #[must_use]
+    pub fn with_approaches(mut self, approaches: Vec<Approach>) -> Self {
+        self.approaches = approaches;
+        self
+    }
 }
 
 /// From which side a joint came that never moves in a recording.
@@ -329,6 +394,7 @@ fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &
 }
 
 /// What recordings can tell, before anything is identified.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Reach {
     /// Independent combinations of all unknowns that these recordings see.

@@ -28,6 +28,7 @@ pub enum Mode {
 }
 
 /// How hard to try.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug)]
 pub struct InverseOptions {
     /// Singular value (rad of tool direction per rad of joint, or as a part of the largest where lengths take
@@ -49,6 +50,43 @@ impl Default for InverseOptions {
     }
 }
 
+impl InverseOptions {
+    /// The same with another singular value below which a direction fades out.
+    #[must_use]
+    pub fn with_weak(mut self, weak: f64) -> Self {
+        self.weak = weak;
+        self
+    }
+
+    /// The same with as many Newton steps at most.
+    #[must_use]
+    pub fn with_steps(mut self, steps: usize) -> Self {
+        self.steps = steps;
+        self
+    }
+
+    /// The same with another distance that counts as reached, m.
+    #[must_use]
+    pub fn with_position_m(mut self, position_m: f64) -> Self {
+        self.position_m = position_m;
+        self
+    }
+
+    /// The same with another angle that counts as reached, rad.
+    #[must_use]
+    pub fn with_angle_rad(mut self, angle_rad: f64) -> Self {
+        self.angle_rad = angle_rad;
+        self
+    }
+
+    /// The same with travel respected, or not.
+    #[must_use]
+    pub fn with_within_travel(mut self, within_travel: bool) -> Self {
+        self.within_travel = within_travel;
+        self
+    }
+}
+
 /// Where the tool should be.
 #[derive(Clone, Copy, Debug)]
 pub struct Goal {
@@ -59,6 +97,7 @@ pub struct Goal {
 }
 
 /// How it ended.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// Every equation of the mode holds.
@@ -82,6 +121,7 @@ pub enum Outcome {
 }
 
 /// What was found.
+#[non_exhaustive]
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// Commands, m or rad, machine order.

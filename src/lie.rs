@@ -7,6 +7,7 @@
 //!
 //! [`Scalar`]: crate::Scalar
 
+mod convert;
 mod mat3;
 mod pose;
 mod series;

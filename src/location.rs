@@ -78,6 +78,7 @@ pub trait Knowledge {
 }
 
 /// One location error.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LocationError {
     /// Name, such as `EC0Y` or `EX0C`; `docs/location.md` has the extended ones.
@@ -100,6 +101,7 @@ pub struct LocationError {
 }
 
 /// All location errors of a machine with the datum that they refer to.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LocationErrors {
     /// Joint along which X (or whichever comes first) of the machine coordinate system lies.

@@ -20,8 +20,14 @@ pub(crate) use read::{at_path, is_usable_name};
 pub use side::SideBranch;
 pub(crate) use write::{in_unit, to_text};
 
+use crate::error::{Error, Place, Result};
 use crate::lie::Vec3;
 use crate::units::Unit;
+
+/// A fault of a machine that was built and not read: its place is the path of the value.
+fn at_value((path, fault): (String, MachineFault)) -> Error {
+    Error::input(Place::file(path), fault)
+}
 
 /// The units in which a machine file states its lengths and angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,14 +112,34 @@ pub struct Machine {
 impl Machine {
     /// Builds and checks a machine; `units` are those in which it is written to a file.
     ///
+    /// ```
+    /// use kincal::machine::{Dyad, FileUnits, Joint, Machine};
+    ///
+    /// let slide = Dyad::new("x").with_joint(Joint::prismatic("x", [1.0, 0.0, 0.0]));
+    /// let tool = vec![slide, Dyad::new("t").at([0.0, 0.0, 0.08])];
+    /// let machine = Machine::new("slide", FileUnits::si(), vec![Dyad::new("w")], tool)?;
+    /// assert_eq!(machine.commands(), ["x"]);
+    /// # Ok::<(), kincal::Error>(())
+    /// ```
+    ///
     /// # Errors
-    /// [`MachineFault`] with the path of the value at fault, such as `tool[2].joint.axis`.
+    /// [`Error::Input`](crate::error::Error::Input) with a [`MachineFault`]; its place is the path of the value at fault, such as
+    /// `tool[2].joint.axis`.
     pub fn new(
         name: impl Into<String>,
         units: FileUnits,
         workpiece: Vec<Dyad>,
         tool: Vec<Dyad>,
-    ) -> Result<Self, (String, MachineFault)> {
+    ) -> Result<Self> {
+        Machine::of_dyads(name, units, workpiece, tool).map_err(at_value)
+    }
+
+    fn of_dyads(
+        name: impl Into<String>,
+        units: FileUnits,
+        workpiece: Vec<Dyad>,
+        tool: Vec<Dyad>,
+    ) -> Checked<Self> {
         let workpiece_count = workpiece.len();
         let dyads = workpiece.into_iter().chain(tool).collect();
         let mut machine = Machine {
@@ -136,7 +162,11 @@ impl Machine {
     ///
     /// # Errors
     /// If the vector is zero or not finite.
-    pub fn with_gravity(mut self, gravity_b: Vec3<f64>) -> Result<Self, (String, MachineFault)> {
+    pub fn with_gravity(self, gravity_b: Vec3<f64>) -> Result<Self> {
+        self.hanging(gravity_b).map_err(at_value)
+    }
+
+    fn hanging(mut self, gravity_b: Vec3<f64>) -> Checked<Self> {
         let length = gravity_b.norm();
         if !(length.is_finite() && length > 1e-9) {
             return Err(("gravity".into(), MachineFault::ZeroVector { what: "direction of gravity".into() }));
@@ -151,13 +181,18 @@ impl Machine {
     ///
     /// # Errors
     /// If one of them is not positive and finite.
-    pub fn with_tolerance(mut self, tolerance: Tolerance) -> Result<Self, (String, MachineFault)> {
+    pub fn with_tolerance(self, tolerance: Tolerance) -> Result<Self> {
+        self.tolerant(tolerance).map_err(at_value)
+    }
+
+    fn tolerant(mut self, tolerance: Tolerance) -> Checked<Self> {
         tolerance.check().map_err(|fault| ("tolerance".to_string(), fault))?;
         self.tolerance = tolerance;
         Ok(self)
     }
 
     /// The same machine with a line that says what it is.
+    #[must_use]
     pub fn with_about(mut self, about: Option<String>) -> Self {
         self.about = about;
         self

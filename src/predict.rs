@@ -19,6 +19,7 @@ use crate::units::{ByQuantity, Rms, Unit, field_by_quantity};
 field_by_quantity!(rms, max, mean, mean_abs);
 
 /// Residuals of a recording under a model, SI. Angles stand beside or instead of lengths.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Prediction {
     /// Samples predicted.
@@ -336,7 +337,7 @@ fn cells(columns: &[Measured], measured: &[f64], residuals: &[f64], sensor: &Sen
 }
 
 fn quaternion(pose: Pose<f64>) -> [f64; 4] {
-    let q = pose.to_isometry().rotation;
+    let q = nalgebra::Isometry3::from(pose).rotation;
     [q.w, q.i, q.j, q.k]
 }
 

@@ -15,6 +15,7 @@
 //! A row is a *drop-out*, left out and counted, where a command, the time, a direction or a measured number is empty or NaN.
 //! A *pause* is a time between two samples longer than five times the median one; derivatives start again after it.
 
+mod arrays;
 mod call;
 mod column;
 mod entry;
@@ -32,6 +33,7 @@ inner! {
     use reader::{Block, Chunk, Chunks, Row, Rows};
     use summary::Summary;
 }
+pub use arrays::Arrays;
 pub use call::open_all;
 pub use column::Channel;
 pub use fault::RecordingFault;

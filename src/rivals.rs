@@ -45,7 +45,7 @@ pub use step::Step;
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
 use crate::feature::Feature;
-use crate::identify::{Loss, ErrorModel, CalibrateOptions, Solver, Stop, calibrate, calibrate_model};
+use crate::identify::{CalibrateOptions, ErrorModel, Loss, Solver, Stop, calibrate, calibrate_model};
 use crate::lie::Twist;
 use crate::machine::{JointKind, Machine};
 use crate::recording::Recording;

@@ -12,6 +12,7 @@ use crate::units::Quantity;
 pub const MOST_READINGS: usize = 6;
 
 /// Kind of instrument, with what is known of it.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sensor {
     /// Distance from the workpiece point to the tool point, less the nominal length unless `absolute`, m.

@@ -113,7 +113,7 @@ impl<'a> Session<'a> {
     pub fn record(&mut self, out: &mut dyn Write, mut each: impl FnMut(&Sample)) -> Result<Option<Written>> {
         let Some(run) = self.runs.get(self.next) else { return Ok(None) };
         let mut recorder = Recorder::new(self.plant.machine(), &run.instrument, self.style, run.directions);
-        out.write_all(recorder.head(&run.claims).as_bytes()).map_err(|e| crate::Error::file("", e))?;
+        out.write_all(recorder.head(&run.claims).as_bytes()).map_err(|e| crate::error::Error::file("", e))?;
         let mut rng = noise_of(self.seed, self.next as u64);
         let mut last = 0.0;
         for sample in run.course.samples()? {

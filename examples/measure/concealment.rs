@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use clap::Args;
-use kincal::identify::{Loss, CalibrateOptions, calibrate};
+use kincal::identify::{CalibrateOptions, Loss, calibrate};
 use kincal::machine::JointKind;
 use kincal::recording::Recording;
 
@@ -74,7 +74,7 @@ fn has_time(set: &Set) -> bool {
 
 /// RMS that constant geometry leaves, m.
 fn geometric(set: &Set, recordings: &[Recording]) -> f64 {
-    let options = CalibrateOptions { loss: Loss::Squares, prior: false, ..CalibrateOptions::default() };
+    let options = CalibrateOptions::default().with_loss(Loss::Squares).with_prior(false);
     let (_, fit) =
         calibrate(&set.machine, recordings, options).unwrap_or_else(|e| panic!("{}: {e}", set.name));
     fit.rms.m.expect("lengths").geometric

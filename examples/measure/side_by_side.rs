@@ -4,7 +4,7 @@ use std::path::Path;
 
 use kincal::Machine;
 use kincal::effects::Library;
-use kincal::identify::{Loss, CalibrateOptions};
+use kincal::identify::{CalibrateOptions, Loss};
 use kincal::machine::Tolerance;
 
 use crate::left_out::cross_validate;
@@ -24,7 +24,7 @@ pub fn losses() {
         let folds = set.folds();
         let column = losses.map(|(name, loss)| {
             let (_, held_out) =
-                cross_validate(&set, &folds, &set.machine, CalibrateOptions { loss, ..CalibrateOptions::default() });
+                cross_validate(&set, &folds, &set.machine, CalibrateOptions::default().with_loss(loss));
             format!("{name} {held_out:7.4}")
         });
         println!("{:<24} left out, mm: {}", set.name, column.join("  "));

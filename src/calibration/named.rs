@@ -11,6 +11,7 @@ use crate::units::Unit;
 use crate::variation::{Part, Term, Variation};
 
 /// An effect that is not used, and why.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct LeftOut {
     /// Name of the effect.

@@ -3,14 +3,14 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use clap::ValueEnum;
-use crate::identify::{Figures, Fit, Loss, ErrorModel, CalibrateOptions, Solver, calibrate_model};
+use crate::calibration::CalibratedMachine;
+use crate::identify::{CalibrateOptions, ErrorModel, Figures, Fit, Loss, Solver, calibrate_model};
 use crate::machine::JointKind;
+use crate::machine::Machine;
 use crate::units::Rms;
 use crate::units::{Quantity, Unit, amount};
 use crate::variation::{Directions, MOST_AXES, Varying};
-use crate::calibration::CalibratedMachine;
-use crate::machine::Machine;
+use clap::ValueEnum;
 
 use super::Common;
 use super::output::{

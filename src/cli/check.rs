@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use crate::machine::Machine;
 use crate::check::{PASS, check};
+use crate::machine::Machine;
 use serde_json::json;
 
 use super::Common;

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::rivals::{Arena, Rival, Tuning, Verdict, split};
 use crate::calibration::CalibratedMachine;
 use crate::machine::Machine;
+use crate::rivals::{Arena, Rival, Tuning, Verdict, split};
 use serde::Serialize;
 
 use super::Common;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
-use crate::compensate::{Listed, CompensateOptions, Report, Setup, UnknownWay, Worst, compensate};
+use crate::compensate::{CompensateOptions, Listed, Report, Setup, UnknownWay, Worst, compensate};
 use crate::inverse::Mode;
 use crate::nc::Dialect;
 use crate::units::{Quantity, Unit};

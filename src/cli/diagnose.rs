@@ -7,9 +7,9 @@ mod text;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use crate::machine::Machine;
-use crate::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use crate::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use crate::effects::Library;
+use crate::machine::Machine;
 
 use super::Common;
 use super::output::{Outcome, check_outputs, open_machine, open_recordings, write_whole};

@@ -4,10 +4,10 @@ use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use indicatif::ProgressBar;
-use crate::recording::{Recording, open_all};
 use crate::error::{Error, Place};
 use crate::machine::Machine;
+use crate::recording::{Recording, open_all};
+use indicatif::ProgressBar;
 
 use super::Common;
 use super::part::Part;
@@ -76,7 +76,10 @@ fn misplaced(path: &Path, is: &str, expected: &str) -> Failure {
 }
 
 /// Opens a machine file by `open`; a recording in its place is told as such.
-pub(crate) fn open_machine<T>(path: &Path, open: impl FnOnce(&Path) -> crate::error::Result<T>) -> Outcome<T> {
+pub(crate) fn open_machine<T>(
+    path: &Path,
+    open: impl FnOnce(&Path) -> crate::error::Result<T>,
+) -> Outcome<T> {
     open(path).map_err(|error| match looks_like(path) {
         Some(Looks::Recording) => misplaced(path, "recording", "machine file"),
         _ => error.into(),
@@ -203,7 +206,10 @@ fn write_into(
 
 /// Writes a file whole or not at all: into a neighbour first, then renamed. A link stays a link, and its file is
 /// replaced; what is no file (a pipe, `/dev/null`) is written to as it is, since a file in its place would end it.
-pub(crate) fn write_whole(path: &Path, write: impl FnOnce(&mut dyn Write) -> crate::error::Result<()>) -> Outcome {
+pub(crate) fn write_whole(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> crate::error::Result<()>,
+) -> Outcome {
     let failed = |source: std::io::Error| not_written(path, &source);
     let known = std::fs::metadata(path).ok();
     if known.as_ref().is_some_and(|it| !it.is_file() && !it.is_dir()) {

@@ -8,6 +8,7 @@ use crate::calibration::LeftOut;
 pub const MOST_LISTED: usize = 50;
 
 /// A list that names the first [`MOST_LISTED`] of its entries and counts all.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize)]
 pub struct Listed<T> {
     /// How many there are.
@@ -43,6 +44,7 @@ impl<T> Listed<T> {
 }
 
 /// A figure, and the line at which it is reached.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Worst {
     /// m or rad.
@@ -60,6 +62,7 @@ impl Worst {
 }
 
 /// The correction changes at once, because the direction of travel did.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize)]
 pub struct Reversal {
     /// Line of the block that starts with it.
@@ -71,6 +74,7 @@ pub struct Reversal {
 }
 
 /// The axes travel in a pattern of directions that no recording has shown.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize)]
 pub struct UnseenPiece {
     /// Line of the block.
@@ -80,6 +84,7 @@ pub struct UnseenPiece {
 }
 
 /// An axis comes to a block's end from a place that is not known.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize)]
 pub struct UnknownWay {
     /// Line of the block.
@@ -91,6 +96,7 @@ pub struct UnknownWay {
 }
 
 /// A joint that would leave its travel.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize)]
 pub struct OutOfTravel {
     /// Line of the block.
@@ -102,6 +108,7 @@ pub struct OutOfTravel {
 }
 
 /// A pose at which the joints have lost a direction.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize)]
 pub struct SingularBlock {
     /// Line of the block.
@@ -113,6 +120,7 @@ pub struct SingularBlock {
 }
 
 /// A pose that the corrected machine does not reach.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize)]
 pub struct Unreached {
     /// Line of the block.
@@ -124,6 +132,7 @@ pub struct Unreached {
 }
 
 /// What [`compensate`](super::compensate) did. Lengths in m, angles in rad.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// Name of the machine.
@@ -193,6 +202,7 @@ pub struct Report {
 
 /// Errors of tip and tool axis that may be left because no recording has shown them. Root mean squares over
 /// the moves, one standard deviation.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Unseen {
     /// Of the tip, m.
@@ -204,6 +214,7 @@ pub struct Unseen {
 }
 
 /// One combination of deviations that no recording has shown.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct UnseenPattern {
     /// Its largest components, in units of their tolerances: `c.vx`.

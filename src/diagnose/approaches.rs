@@ -9,6 +9,7 @@ use crate::identify::Approach;
 use crate::machine::Machine;
 
 /// A joint that stands still all through a recording.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StandsStill {
     /// File name.
@@ -26,6 +27,7 @@ pub struct StandsStill {
 }
 
 /// A column that says from which side a joint came.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SaidBy {
     /// Its heading, `<command>_direction[1]`.

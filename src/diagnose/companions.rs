@@ -13,6 +13,7 @@ use crate::effects::Library;
 use crate::machine::Machine;
 
 /// A joint that has an effect of the findings too, so little that it is no finding; the model has it.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Companion {
     /// Name of the effect.

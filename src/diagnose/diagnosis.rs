@@ -20,6 +20,7 @@ use crate::units::{ByQuantity, field_by_quantity};
 field_by_quantity!(noise_floor, rms, held_out_rms, rms_without_outliers);
 
 /// Everything that a diagnosis has to say. Numbers in SI; `docs/commands.md` lists the fields.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Name of the machine.
@@ -88,6 +89,7 @@ pub(super) struct Named {
 }
 
 /// RMS under three models.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct RmsByModel {
     /// The machine as declared.
@@ -99,6 +101,7 @@ pub struct RmsByModel {
 }
 
 /// Held-out RMS under two models.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HeldOutRms {
     /// With constant deviations.

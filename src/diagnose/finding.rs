@@ -8,6 +8,7 @@ use crate::units::{ByQuantity, field_by_quantity};
 field_by_quantity!(held_out_rms);
 
 /// One effect.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Finding {
     /// Its name.
@@ -47,6 +48,7 @@ impl Finding {
 }
 
 /// A number of a finding.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Size {
     /// Its name.
@@ -60,6 +62,7 @@ pub struct Size {
 }
 
 /// The same family at the same place with as many numbers, and a cause that has nothing to do with it.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Meaningless {
     /// The cause, as part of a sentence: of all, the one with which most is explained.
@@ -69,6 +72,7 @@ pub struct Meaningless {
 }
 
 /// Another name for the same.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Confusable {
     /// Name of the family.
@@ -82,6 +86,7 @@ pub struct Confusable {
 }
 
 /// Held-out RMS without and with one finding.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HeldOutPair {
     /// All others taken in.

@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
 use crate::identify::{
-    EXTRAS, Evaluator, Fit, Known, Layout, Moment, CalibrateOptions, Places, Role, Source, Sources, Stretch, Unknowns,
-    optimum, sources,
+    CalibrateOptions, EXTRAS, Evaluator, Fit, Known, Layout, Moment, Places, Role, Source, Sources, Stretch,
+    Unknowns, optimum, sources,
 };
 use crate::machine::Machine;
 use crate::motion::Motion;

@@ -6,7 +6,7 @@ use crate::calibration::{CalibratedMachine, terms};
 use crate::effects::{RecordingFacts, StoredEffect};
 use crate::error::{Error, Result};
 use crate::feature::as_seen_in;
-use crate::identify::{ErrorModel, CalibrateOptions, calibrate_model};
+use crate::identify::{CalibrateOptions, ErrorModel, calibrate_model};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::sensor::Sensor;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::effects::{Candidates, NO_TIME};
 
 /// Effects that were tried nowhere, for one reason.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NotTried {
     /// Why, as the end of a sentence.

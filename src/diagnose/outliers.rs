@@ -11,6 +11,7 @@ use crate::units::{ByQuantity, Quantity, field_by_quantity};
 field_by_quantity!(largest);
 
 /// Samples of one recording that lie far off their surroundings whatever is taken away.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outliers {
     /// File name.
@@ -23,6 +24,7 @@ pub struct Outliers {
 }
 
 /// RMS of all samples but outliers.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct WithoutOutliers {
     /// With constant deviations.

@@ -12,6 +12,7 @@ use crate::units::{ByQuantity, Quantity, field_by_quantity};
 field_by_quantity!(rms);
 
 /// What is left of one set-up when all others say what the machine is like.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SetUpLeftOut {
     /// Its name.
@@ -24,6 +25,7 @@ pub struct SetUpLeftOut {
 }
 
 /// RMS of a set-up left out under three models.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct LeftOutRms {
     /// With constant deviations.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::machine::{Machine, SideBranch};
 
 /// A side branch whose joints have no column in some recording: its weight is not told from that of what carries it.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnseenSideBranch {
     /// Frame that carries it.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::search::Search;
 
 /// A stretch of a recording.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Where {
     /// File name.

@@ -7,6 +7,7 @@ use super::stretch::{Where, wheres};
 use crate::machine::{JointKind, Machine};
 
 /// Structure that no family explains.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Unexplained {
     /// How large it is, m (rad where only angles are measured).
@@ -25,6 +26,7 @@ pub struct Unexplained {
 }
 
 /// A stretch of a joint's travel that holds more of the misfit than of the samples.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gathering {
     /// Name of the joint.

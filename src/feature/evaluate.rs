@@ -5,7 +5,7 @@ use num_dual::DualSVec64;
 use super::bind::Feature;
 use super::node::{Column, Function, Node};
 use super::{JointSamples, Samples};
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// What the parts of a feature that have history carry from one stretch of samples to the next.
 #[derive(Clone, Debug)]

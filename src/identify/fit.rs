@@ -11,7 +11,7 @@ use super::solve::Problem;
 use super::source::{Known, Which};
 use super::unknowns::{Block, Role, Unknowns};
 use super::warnings::warnings;
-use super::{Found, Information, Loss, CalibrateOptions, Solver, Stop};
+use super::{CalibrateOptions, Found, Information, Loss, Solver, Stop};
 
 use crate::error::Result;
 use crate::lie::Vec3;
@@ -27,6 +27,7 @@ const LISTED: usize = 50;
 field_by_quantity!(rms);
 
 /// Everything that an identification has to say. Numbers in SI.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Fit {
     /// Name of the machine.
@@ -96,6 +97,7 @@ pub struct Fit {
 }
 
 /// A figure before and after identification.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BeforeAfter {
     /// Machine as declared, only what nobody has stated is fitted.
@@ -105,6 +107,7 @@ pub struct BeforeAfter {
 }
 
 /// Residuals of samples that were held out.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HeldOut {
     /// Machine as declared, only what nobody has stated is fitted.
@@ -114,6 +117,7 @@ pub struct HeldOut {
 }
 
 /// Coefficient of a term.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct CoefficientFit {
     /// Its value, in its own SI unit.
@@ -124,6 +128,7 @@ pub struct CoefficientFit {
 }
 
 /// How well one recording is described.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RecordingFit {
     /// File name.
@@ -148,6 +153,7 @@ pub struct RecordingFit {
 }
 
 /// One component of a deviation.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ParameterFit {
     /// Frame of the dyad.
@@ -171,6 +177,7 @@ pub struct ParameterFit {
 }
 
 /// A combination of deviations that the data see as one number.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Combination {
     /// What share of it comes from the data, 0 to 1.
@@ -180,6 +187,7 @@ pub struct Combination {
 }
 
 /// A set-up as found.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SetupFit {
     /// Name; empty for the default one.
@@ -193,6 +201,7 @@ pub struct SetupFit {
 }
 
 /// A sample that counted little.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Suspect {
     /// File name.

@@ -11,6 +11,7 @@ use crate::residual::Sizes;
 use crate::units::{ByQuantity, Rms};
 
 /// Residuals over some samples; norms of positions and rotations, absolute values of scalars. m and rad.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// How many samples.
@@ -24,6 +25,7 @@ pub struct Figures {
 }
 
 /// One piece of a model.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PieceFit {
     /// Its name, such as `AFCR`: A forward, C reverse.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// How a standardised residual `e` (in standard deviations of the noise) counts.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "snake_case")]
 pub enum Loss {

@@ -3,8 +3,8 @@
 use super::source::Sources;
 use super::unknowns::{Layout, Unknowns};
 use super::{
-    Fit, Info, ErrorModel, CalibrateOptions, Placed, Problem, enough_for_setups, enough_to_start, fit, information,
-    is_of_setup, place, settle,
+    CalibrateOptions, ErrorModel, Fit, Info, Placed, Problem, enough_for_setups, enough_to_start, fit,
+    information, is_of_setup, place, settle,
 };
 use crate::error::Result;
 use crate::machine::Machine;

@@ -15,6 +15,7 @@ use crate::machine::Machine;
 use crate::variation::Varying;
 
 /// How the identification walks to its optimum.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "snake_case")]
 pub enum Solver {
@@ -45,6 +46,7 @@ impl Solver {
 }
 
 /// Why an identification stopped.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {

@@ -3,7 +3,7 @@
 use std::ops::{Add, Mul};
 
 use super::Vec3;
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// Three rows of three components.
 #[derive(Clone, Copy, Debug, PartialEq)]

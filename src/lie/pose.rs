@@ -5,7 +5,7 @@ use std::ops::Mul;
 use super::series::{Coefficients, half_angle_per_sine};
 use super::twist::inverse_left_jacobian_so3;
 use super::{Adjoint, Mat3, Twist, Vec3, Wrench};
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// A rigid displacement, or the pose of one frame in another: `a_from_b` maps coordinates in b to coordinates in a.
 ///
@@ -80,7 +80,7 @@ impl<S: Scalar> Pose<S> {
     }
 
     /// Unit quaternion of the rotation part, scalar part first and not negative.
-    fn quaternion(self) -> (S, Vec3<S>) {
+    pub(super) fn quaternion(self) -> (S, Vec3<S>) {
         let [[a, b, c], [d, e, f], [g, h, i]] = self.rotation.0;
         // Shepperd's four cases: 4 times the square of each component, and the products with it.
         let cases = [
@@ -146,26 +146,6 @@ impl Pose<f64> {
     #[inline(always)]
     pub fn lift<S: Scalar>(self, like: S) -> Pose<S> {
         Pose { rotation: self.rotation.lift(like), translation: self.translation.lift(like) }
-    }
-
-    /// As nalgebra's isometry.
-    pub fn to_isometry(self) -> nalgebra::Isometry3<f64> {
-        let (s, u) = self.quaternion();
-        let quaternion = nalgebra::Quaternion::new(s, u.0[0], u.0[1], u.0[2]);
-        nalgebra::Isometry3::from_parts(
-            nalgebra::Translation3::from(nalgebra::Vector3::from(self.translation)),
-            nalgebra::UnitQuaternion::from_quaternion(quaternion),
-        )
-    }
-}
-
-impl From<nalgebra::Isometry3<f64>> for Pose<f64> {
-    fn from(isometry: nalgebra::Isometry3<f64>) -> Self {
-        let m = isometry.rotation.to_rotation_matrix();
-        Pose {
-            rotation: Mat3(std::array::from_fn(|i| std::array::from_fn(|j| m[(i, j)]))),
-            translation: isometry.translation.vector.into(),
-        }
     }
 }
 

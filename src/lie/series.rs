@@ -3,7 +3,7 @@
 //! Each is a power series below one radian and a closed form above. At the switch the closed forms have lost nothing to
 //! cancellation yet and the series have ten terms (the first omitted one is below 1e-18), so value and derivative agree to rounding.
 
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// Below this squared angle the series is used, rad².
 const SERIES_BELOW: f64 = 1.0;

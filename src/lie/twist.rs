@@ -4,7 +4,7 @@ use std::ops::{Add, Neg, Sub};
 
 use super::series::{Coefficients, inverse_jacobian_coefficient};
 use super::{Mat3, Vec3};
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// An element of se(3), linear part first: `v` in m, `w` in rad, in the frame that its name or documentation says.
 #[derive(Clone, Copy, Debug, PartialEq)]

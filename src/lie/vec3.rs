@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Neg, Sub};
 
-use crate::Scalar;
+use crate::scalar::Scalar;
 
 /// Three components; what they mean (m, rad, 1) is said where it is used.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,18 +76,6 @@ impl<S: Scalar> Neg for Vec3<S> {
     #[inline(always)]
     fn neg(self) -> Self {
         Vec3(self.0.map(|c| -c))
-    }
-}
-
-impl From<nalgebra::Vector3<f64>> for Vec3<f64> {
-    fn from(v: nalgebra::Vector3<f64>) -> Self {
-        Vec3([v.x, v.y, v.z])
-    }
-}
-
-impl From<Vec3<f64>> for nalgebra::Vector3<f64> {
-    fn from(v: Vec3<f64>) -> Self {
-        nalgebra::Vector3::new(v.0[0], v.0[1], v.0[2])
     }
 }
 

@@ -6,6 +6,14 @@ use super::MachineFault;
 use crate::lie::{Pose, Twist, Vec3};
 
 /// Initial pose of a frame in the one before it, and the joint that follows.
+///
+/// ```
+/// use kincal::machine::{Dyad, Joint};
+///
+/// let a = Dyad::new("a").at([0.0, 0.0, -0.12]).with_joint(Joint::revolute("a", [1.0, 0.0, 0.0]).with_travel(-2.0, 0.5));
+/// assert_eq!(a.placement.at.0[2], -0.12);
+/// ```
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dyad {
     /// Name of the frame.
@@ -30,6 +38,41 @@ impl Dyad {
             mass: None,
             tolerance: None,
         }
+    }
+
+    /// The same with its origin here in the frame before it, m.
+    #[must_use]
+    pub fn at(mut self, at: impl Into<Vec3<f64>>) -> Self {
+        self.placement.at = at.into();
+        self
+    }
+
+    /// The same with this initial pose `M_j` in the frame before it.
+    #[must_use]
+    pub fn placed(mut self, previous_from_frame: impl Into<Placement>) -> Self {
+        self.placement = previous_from_frame.into();
+        self
+    }
+
+    /// The same with a joint.
+    #[must_use]
+    pub fn with_joint(mut self, joint: Joint) -> Self {
+        self.joint = Some(joint);
+        self
+    }
+
+    /// The same with a mass behind its joint.
+    #[must_use]
+    pub fn with_mass(mut self, mass: MassPoint) -> Self {
+        self.mass = Some(mass);
+        self
+    }
+
+    /// The same with a tolerance of its own.
+    #[must_use]
+    pub fn with_tolerance(mut self, tolerance: Tolerance) -> Self {
+        self.tolerance = Some(tolerance);
+        self
     }
 }
 
@@ -72,6 +115,7 @@ pub enum JointKind {
 }
 
 /// A joint with one degree of freedom.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Name in recordings; the frame's unless the file says otherwise.
@@ -92,6 +136,37 @@ impl Joint {
     /// A joint named `name` about or along the unit vector `axis`.
     pub fn new(name: impl Into<String>, kind: JointKind, axis: Vec3<f64>) -> Self {
         Joint { name: name.into(), kind, axis, travel: None, follows: None, nc: None }
+    }
+
+    /// A joint named `name` along a unit vector of the dyad's own frame.
+    pub fn prismatic(name: impl Into<String>, axis: impl Into<Vec3<f64>>) -> Self {
+        Joint::new(name, JointKind::Prismatic, axis.into())
+    }
+
+    /// A joint named `name` about a unit vector of the dyad's own frame.
+    pub fn revolute(name: impl Into<String>, axis: impl Into<Vec3<f64>>) -> Self {
+        Joint::new(name, JointKind::Revolute, axis.into())
+    }
+
+    /// The same with limits of its displacement, m or rad.
+    #[must_use]
+    pub fn with_travel(mut self, from: f64, to: f64) -> Self {
+        self.travel = Some((from, to));
+        self
+    }
+
+    /// The same, its displacement the sum of these joints' commands times factors; its own name may be among them.
+    #[must_use]
+    pub fn with_follows(mut self, factors: impl IntoIterator<Item = (String, f64)>) -> Self {
+        self.follows = Some(factors.into_iter().collect());
+        self
+    }
+
+    /// The same with an NC word of its own.
+    #[must_use]
+    pub fn with_nc(mut self, nc: NcWord) -> Self {
+        self.nc = Some(nc);
+        self
     }
 
     /// `xi`: the joint's twist in its own frame, per m or rad of displacement, `docs/model.md` (8).

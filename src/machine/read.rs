@@ -46,7 +46,7 @@ impl Machine {
             let path = |i| format!("{}[{i}]", branch.field());
             forms.iter().enumerate().map(|(i, f)| dyad(f, units, &path(i))).collect()
         };
-        let mut machine = Machine::new(
+        let mut machine = Machine::of_dyads(
             form.name.clone(),
             units,
             branch(Branch::Workpiece, &form.workpiece)?,
@@ -55,10 +55,10 @@ impl Machine {
         .with_about(form.about.clone());
         if let Some(gravity) = form.gravity {
             finite("gravity", gravity, "direction of gravity")?;
-            machine = machine.with_gravity(vec3(gravity))?;
+            machine = machine.hanging(vec3(gravity))?;
         }
         if let Some(form) = form.tolerance {
-            machine = machine.with_tolerance(tolerance(form, units, "tolerance")?)?;
+            machine = machine.tolerant(tolerance(form, units, "tolerance")?)?;
         }
         let side = |(b, form): (usize, &SideBranchForm)| -> Checked<SideBranch> {
             let path = |i| format!("side_branches[{b}].dyads[{i}]");
@@ -66,7 +66,7 @@ impl Machine {
             let (on, recorded_as) = (form.on.clone(), form.recorded_as.clone());
             Ok(SideBranch { on, recorded_as, dyads: dyads.collect::<Checked<_>>()? })
         };
-        machine.with_side_branches(form.side_branches.iter().enumerate().map(side).collect::<Checked<_>>()?)
+        machine.with_sides(form.side_branches.iter().enumerate().map(side).collect::<Checked<_>>()?)
     }
 
     /// Checks everything that concerns more than one value, and works out commands and drives.

@@ -2,12 +2,15 @@
 
 use std::collections::BTreeSet;
 
+use super::at_value;
 use super::number::Checked;
 use super::read::{check_dyad, usable_name};
 use super::{Dyad, Joint, JointKind, Machine, MachineFault};
+use crate::error::Result;
 
 /// Frames and joints that stand on a frame of the machine and weigh on it; nothing of them is measured or identified. Their joints are
 /// extra columns of recordings, by name.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub struct SideBranch {
     /// Frame of the machine that carries it, behind that frame's joint.
@@ -44,10 +47,11 @@ impl Machine {
     ///
     /// # Errors
     /// If a frame or joint is named twice, stands on no frame of the machine, or states what only a chain that is measured can have.
-    pub fn with_side_branches(
-        mut self,
-        side_branches: Vec<SideBranch>,
-    ) -> Result<Self, (String, MachineFault)> {
+    pub fn with_side_branches(self, side_branches: Vec<SideBranch>) -> Result<Self> {
+        self.with_sides(side_branches).map_err(at_value)
+    }
+
+    pub(super) fn with_sides(mut self, side_branches: Vec<SideBranch>) -> Checked<Self> {
         let own = |dyad: &Dyad| {
             let joint = dyad.joint.as_ref().map(|joint| joint.name.clone());
             [Some(dyad.frame.clone()), joint].into_iter().flatten().collect::<Vec<_>>()

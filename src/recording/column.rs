@@ -4,8 +4,8 @@ use super::RecordingFault as Fault;
 use super::entry::{example_unit, quantity_of};
 use super::header::{Draft, Measurement, NominalLength};
 use super::text::{self, Fail};
-use crate::Machine;
 use crate::machine::Drive;
+use crate::machine::Machine;
 use crate::units::{Quantity, Unit};
 
 /// A column as written in the header row.

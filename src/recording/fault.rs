@@ -8,6 +8,18 @@ use crate::wording;
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordingFault {
+    /// Arrays of different lengths.
+    #[error("`{column}` has {values} values, and `{first}` has {samples}")]
+    UnequalArrays {
+        /// Its column.
+        column: String,
+        /// How many values it has.
+        values: usize,
+        /// The first column.
+        first: String,
+        /// How many values that has.
+        samples: usize,
+    },
     /// Nothing but blanks in the file.
     #[error("file is empty")]
     Empty,
@@ -340,6 +352,7 @@ impl Fault for RecordingFault {
     fn mend(&self) -> String {
         use RecordingFault::*;
         match self {
+            UnequalArrays { .. } => "give one value for each sample; NaN for a reading that is missing".into(),
             Empty => "a recording holds lines `# key: value`, one header row and rows of numbers".into(),
             NotUtf8 => "save the file as CSV in UTF-8 (plain ASCII is UTF-8; `um` for micrometres)".into(),
             LineTooLong { .. } => "write one sample per line; is this a text file at all?".into(),

@@ -3,11 +3,12 @@
 use super::RecordingFault as Fault;
 use super::entry::{Entry, quantity_of};
 use super::text::{self, Fail};
-use crate::Machine;
 use crate::lie::Vec3;
+use crate::machine::Machine;
 use crate::units::Quantity;
 
 /// What a recording says of itself, in m and rad.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// Name of the machine, if the file says it; it is then that of the machine it is read for.
@@ -35,6 +36,7 @@ pub struct Header {
 }
 
 /// What was measured.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measurement {
     /// Distance of the measured point from the workpiece point, m.
@@ -78,6 +80,7 @@ impl Measurement {
 }
 
 /// The measured point in frame `t`.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq)]
 pub enum ToolPoint {
     /// Its coordinates, m.
@@ -87,6 +90,7 @@ pub enum ToolPoint {
 }
 
 /// Length that a ballbar's reading refers to.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NominalLength {
     /// m.
@@ -98,6 +102,7 @@ pub enum NominalLength {
 }
 
 /// Standard uncertainty of the instrument.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sigma {
     /// In m or rad.

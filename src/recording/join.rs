@@ -16,6 +16,7 @@ use crate::units::Unit;
 const SAME: f64 = 1e-6;
 
 /// A recording with another one's columns beside its own.
+#[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Joined {
     /// The new recording, line for line as the first one was.

@@ -217,7 +217,7 @@ impl<'a> Pass<'a> {
         std::str::from_utf8(self.lines.bytes(line.content)).map_err(|_| self.fail(0, Fault::NotUtf8))
     }
 
-    fn fail(&self, column: usize, fault: Fault) -> crate::Error {
+    fn fail(&self, column: usize, fault: Fault) -> crate::error::Error {
         self.recording.error(Fail::at(self.lines.number, column, fault))
     }
 
@@ -392,7 +392,7 @@ mod tests {
     fn rotation_vector_of_a_quaternion_is_that_of_the_rotation() {
         for w in [[0.0, 0.0, 0.0], [1e-9, -2e-9, 0.0], [0.3, -0.2, 0.9], [0.0, 3.1, 0.0]] {
             let pose = Pose::exp(Twist::from_array([0.0, 0.0, 0.0, w[0], w[1], w[2]]));
-            let q = pose.to_isometry().rotation.into_inner();
+            let q = nalgebra::Isometry3::from(pose).rotation.into_inner();
             for scale in [1.0, -1.0, 1.0005] {
                 let q = [q.w, q.i, q.j, q.k].map(|c| c * scale);
                 let back = rotation_vector(q).expect("a unit quaternion");

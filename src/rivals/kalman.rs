@@ -14,7 +14,7 @@ use super::state;
 use crate::calibration::CalibratedMachine;
 use crate::chain::deviation_jacobian;
 use crate::error::{Error, Result};
-use crate::identify::{COMPONENTS, Loss, CalibrateOptions, Stop, calibrate};
+use crate::identify::{COMPONENTS, CalibrateOptions, Loss, Stop, calibrate};
 use crate::lie::{Pose, Twist};
 use crate::machine::{Machine, Tolerance};
 use crate::recording::Recording;

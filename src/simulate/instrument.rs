@@ -10,6 +10,7 @@ use crate::sensor::{Sensor, SensorState};
 use crate::units::{ByQuantity, Quantity};
 
 /// How readings scatter; the size is [`Instrument::noise_m`] or [`Instrument::noise_rad`].
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scatter {
     /// Normal, the size being the standard deviation.
@@ -32,6 +33,7 @@ impl Scatter {
 }
 
 /// An instrument with its noise.
+#[non_exhaustive]
 #[derive(Clone, Debug)]
 pub struct Instrument {
     /// Kind.

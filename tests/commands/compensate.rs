@@ -7,7 +7,7 @@ use crate::common;
 use crate::program::{Folder, command};
 use kincal::CalibratedMachine;
 use kincal::compensate::Setup;
-use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
+use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
 use kincal::simulate::{
@@ -149,9 +149,10 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
         Recording::from_bytes("rec.csv", texts[0].as_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"));
     let axes = ["a", "c"].map(|name| machine.commands().iter().position(|c| c == name).expect("an axis"));
     let varying = Varying { directions: Some(Directions::new(axes.to_vec())), terms: Vec::new() };
-    let model = ErrorModel { varying, ..ErrorModel::default() };
-    let (calibrated, _) = calibrate_model(&machine, &[measured], &model, CalibrateOptions::default(), &|_| {})
-        .unwrap_or_else(|e| panic!("{e}"));
+    let model = ErrorModel::default().with_varying(varying);
+    let (calibrated, _) =
+        calibrate_model(&machine, &[measured], &model, CalibrateOptions::default(), &|_| {})
+            .unwrap_or_else(|e| panic!("{e}"));
     std::fs::write(bench.0.0.join("machine.ron"), calibrated.to_ron()).expect("writable");
     let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
     assert!(out.status.success(), "{}", text(&out.stderr));

@@ -1,7 +1,7 @@
 //! Set-ups found from nothing: frames, tool points, lengths and zeros, whatever the machine file says of frame `w`.
 
 use crate::common;
-use kincal::identify::{Fit, CalibrateOptions, calibrate, fit_setup};
+use kincal::identify::{CalibrateOptions, Fit, calibrate, fit_setup};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::machine::Placement;
 use kincal::predict::predict;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::common;
-use kincal::identify::{Fit, CalibrateOptions, calibrate, fit_setup};
+use kincal::identify::{CalibrateOptions, Fit, calibrate, fit_setup};
 use kincal::lie::Vec3;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
@@ -82,8 +82,8 @@ impl Case {
     fn fit(&self, text: String) -> Fit {
         let recordings = [Recording::from_bytes("case.csv", text.into_bytes(), &self.machine)
             .unwrap_or_else(|e| panic!("{e}"))];
-        let (_, fit) =
-            calibrate(&self.machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let (_, fit) = calibrate(&self.machine, &recordings, CalibrateOptions::default())
+            .unwrap_or_else(|e| panic!("{e}"));
         fit
     }
 }
@@ -195,7 +195,8 @@ fn instruments_of_one_kind_with_different_sigma_keep_their_own_noise() {
     };
     let (mut fine, machine) = (fine, coarse.machine.clone());
     let recordings = [with(&mut fine, "1"), with(&mut coarse, "100")];
-    let (_, fit) = calibrate(&machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    let (_, fit) =
+        calibrate(&machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
     for (recording, sigma) in fit.recordings.iter().zip([1e-6, 1e-4]) {
         assert!((0.9..1.2).contains(&(recording.sigma / sigma)), "{} m, stated {sigma} m", recording.sigma);
         assert!(recording.birge.is_some_and(|b| (0.8..1.2).contains(&b)), "{:?}", recording.birge);
@@ -219,8 +220,8 @@ fn a_ballbar_of_unknown_length_is_found_from_nothing() {
         }
         let recordings = [Recording::from_bytes("bar.csv", case.text().into_bytes(), &case.machine)
             .unwrap_or_else(|e| panic!("{e}"))];
-        let (calibrated, fit) =
-            calibrate(&case.machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let (calibrated, fit) = calibrate(&case.machine, &recordings, CalibrateOptions::default())
+            .unwrap_or_else(|e| panic!("{e}"));
         let (_, length) = calibrated.lengths().next().expect("a length");
         let rms = fit.rms.m.expect("lengths");
         println!(

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::harness;
 use kincal::Machine;
-use kincal::identify::{Loss, CalibrateOptions, calibrate};
+use kincal::identify::{CalibrateOptions, Loss, calibrate};
 use kincal::recording::Recording;
 
 use crate::harness::answer;
@@ -33,7 +33,7 @@ fn left_by_geometry(case: &Case, folder: &Path) -> f64 {
     let recordings: Vec<Recording> = (1..case.world.runs.len())
         .map(|k| Recording::open(own.join(format!("rec_{k}.csv")), &machine).expect("a valid recording"))
         .collect();
-    let options = CalibrateOptions { loss: Loss::Squares, prior: false, ..CalibrateOptions::default() };
+    let options = CalibrateOptions::default().with_loss(Loss::Squares).with_prior(false);
     let (_, fit) = calibrate(&machine, &recordings, options).expect("fits");
     let (sigma_m, sigma_rad) = case.world.sigma;
     match (fit.rms.m, case.world.reads_angle()) {

@@ -4,7 +4,7 @@ use crate::common;
 use crate::common::random::Random;
 use crate::table::{Axes, Bar, Best, SIGMA, Table, path, record};
 use kincal::feature::Feature;
-use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
+use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};
 use kincal::lie::Twist;
 use kincal::recording::Recording;
 use kincal::simulate::inverse;
@@ -50,7 +50,8 @@ fn identify(
     samples: Option<u64>,
     error_motions: f64,
 ) -> CalibratedMachine {
-    let model = ErrorModel { varying: varying(machine, kind), samples, error_motions, ..ErrorModel::default() };
+    let model = ErrorModel::default().with_varying(varying(machine, kind)).with_error_motions(error_motions);
+    let model = samples.map_or(model.clone(), |samples| model.with_samples(samples));
     calibrate_model(machine, recordings, &model, CalibrateOptions::default(), &|_| {})
         .unwrap_or_else(|e| panic!("{e}"))
         .0

@@ -76,8 +76,9 @@ fn program(path: &[Vec<f64>]) -> String {
 fn compensated(model: &CalibratedMachine, path: &[Vec<f64>]) -> (Vec<Vec<f64>>, Report) {
     let setup = "Setup(tools: {\"1\": 120}, reference_length: 120, work_offsets: {\"G54\": {\"X\": 0, \"Y\": 0, \"Z\": -120}})";
     let setup = Setup::parse("setup.ron", setup).unwrap_or_else(|e| panic!("{e}"));
-    let (text, report) = compensate_text(model, "part.nc", program(path), &setup, &CompensateOptions::default())
-        .unwrap_or_else(|e| panic!("{e}"));
+    let (text, report) =
+        compensate_text(model, "part.nc", program(path), &setup, &CompensateOptions::default())
+            .unwrap_or_else(|e| panic!("{e}"));
     let sent = text.lines().filter(|line| line.starts_with("N1 ")).map(|line| {
         let word = |letter: char| line.split(' ').find_map(|w| w.strip_prefix(letter)).expect("a word");
         ['Y', 'X', 'Z'].map(|l| word(l).parse::<f64>().expect("a number") / 1e3).to_vec()

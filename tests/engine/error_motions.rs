@@ -3,7 +3,7 @@
 use crate::common;
 use crate::table::{Axes, Bar, Table, path, record};
 use kincal::compensate::{CompensateOptions as Writing, Setup, compensate_text};
-use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
+use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};
 use kincal::lie::Twist;
 use kincal::predict::predict;
 use kincal::simulate::{At, Plant, Sample};
@@ -20,10 +20,15 @@ fn calibrated(
     let path = path(machine, 0.1, Bar::Machine, None, 180);
     let recording = record(machine, &table, &path, "rec.csv", 8);
     let varying = Varying { directions: Some(Directions::new(vec![axes.a, axes.c])), terms: Vec::new() };
-    let model = ErrorModel { varying, error_motions, ..ErrorModel::default() };
-    let (found, _) =
-        calibrate_model(machine, std::slice::from_ref(&recording), &model, CalibrateOptions::default(), &|_| {})
-            .unwrap_or_else(|e| panic!("{e}"));
+    let model = ErrorModel::default().with_varying(varying).with_error_motions(error_motions);
+    let (found, _) = calibrate_model(
+        machine,
+        std::slice::from_ref(&recording),
+        &model,
+        CalibrateOptions::default(),
+        &|_| {},
+    )
+    .unwrap_or_else(|e| panic!("{e}"));
     (found, path, recording)
 }
 

@@ -3,7 +3,7 @@
 use crate::common;
 use crate::common::random::normals;
 use kincal::Machine;
-use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use kincal::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 use proptest::prelude::*;

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::common;
 use kincal::describe::describe;
-use kincal::identify::{COMPONENTS, Fit, CalibrateOptions, calibrate};
+use kincal::identify::{COMPONENTS, CalibrateOptions, Fit, calibrate};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::location::{LocationErrors, location_errors};
 use kincal::recording::Recording;
@@ -457,7 +457,7 @@ fn without_prior_an_unseen_error_has_no_standard_error() {
         .collect();
     let csv = recording(&truth, &Instrument::new(Sensor::Pose, 1e-6, 5e-6), &commands, &[], 79);
     let recordings = [Recording::from_bytes("r.csv", csv.into_bytes(), &machine).expect("a recording")];
-    let options = CalibrateOptions { prior: false, ..CalibrateOptions::default() };
+    let options = CalibrateOptions::default().with_prior(false);
     let (_, fit) = calibrate(&machine, &recordings, options).expect("a fit");
     let of = |name: &str| fit.location_errors.errors.iter().find(|e| e.name == name).expect("listed");
     assert!(of("EC0Y").identified && of("EC0Y").std_error < 5e-6);

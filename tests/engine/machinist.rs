@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use crate::common;
 use kincal::compensate::{CompensateOptions, Setup, compensate_text};
-use kincal::identify::{ErrorModel, CalibrateOptions as Fitting, calibrate, calibrate_model};
+use kincal::identify::{CalibrateOptions as Fitting, ErrorModel, calibrate, calibrate_model};
 use kincal::inverse::{Goal, Inverse, Mode};
 use kincal::lie::{Pose, Vec3};
 use kincal::machine::JointKind;
@@ -311,9 +311,14 @@ fn one_ballbar_corrects_what_it_sees_and_the_report_says_what_it_does_not() {
         let calibrated = calibrated_from(&machine, &texts);
         let path = &paths[0];
         let text = program(&machine, path, true);
-        let (corrected, report) =
-            compensate_text(&calibrated, "path.nc", &text, &setup(&machine, true), &CompensateOptions::default())
-                .unwrap_or_else(|e| panic!("{name}: {e}"));
+        let (corrected, report) = compensate_text(
+            &calibrated,
+            "path.nc",
+            &text,
+            &setup(&machine, true),
+            &CompensateOptions::default(),
+        )
+        .unwrap_or_else(|e| panic!("{name}: {e}"));
         let along = |sent: Vec<Vec<f64>>| {
             let chain = actual.chain();
             let off = path.iter().zip(&sent).map(|(q, sent)| {

@@ -2,7 +2,7 @@
 
 use crate::common;
 use crate::common::random::normals;
-use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use kincal::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 
@@ -21,7 +21,8 @@ fn said_of(mut error: impl FnMut(f64, f64) -> f64, without: &[&str]) -> Diagnosi
     let library = without
         .iter()
         .fold(Library::standard(), |library, name| library.without(name).unwrap_or_else(|e| panic!("{e}")));
-    diagnose(&machine, &[recording], &library, &DiagnoseOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"))
+    diagnose(&machine, &[recording], &library, &DiagnoseOptions::default(), &|_| {})
+        .unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn names(said: &Diagnosis) -> Vec<&str> {

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::common;
 use kincal::feature::Feature;
-use kincal::identify::{Loss, ErrorModel, CalibrateOptions, calibrate, calibrate_model};
+use kincal::identify::{CalibrateOptions, ErrorModel, Loss, calibrate, calibrate_model};
 use kincal::lie::{Pose, Twist};
 use kincal::predict::predict;
 use kincal::recording::Recording;
@@ -75,7 +75,7 @@ fn open(machine: &Machine, text: &str) -> [Recording; 1] {
 }
 
 fn exact() -> CalibrateOptions {
-    CalibrateOptions { loss: Loss::Squares, ..CalibrateOptions::default() }
+    CalibrateOptions::default().with_loss(Loss::Squares)
 }
 
 /// Adds to the deviation along a joint.
@@ -105,8 +105,9 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
         let recordings = open(&machine, &record(&machine, &path(&machine, 400), &wrong));
         let varying = Varying { directions: Some(Directions::new(axes.clone())), terms: Vec::new() };
         // Dead bands of nothing: the path is exact.
-        let model =
-            ErrorModel { varying, dead_bands: vec![Some(0.0); machine.commands().len()], ..ErrorModel::default() };
+        let model = ErrorModel::default()
+            .with_varying(varying)
+            .with_dead_bands(vec![Some(0.0); machine.commands().len()]);
         let (calibrated, fit) = calibrate_model(&machine, &recordings, &model, exact(), &|_| {})
             .unwrap_or_else(|e| panic!("{name}: {e}"));
         let (_, plain) = calibrate(&machine, &recordings, exact()).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -183,10 +184,8 @@ fn a_pattern_that_was_never_seen_is_told_and_predicted_from_single_directions() 
     };
     let train = open(&machine, &stated(&|forward| forward != [true, true]));
     let judge = open(&machine, &stated(&|_| true));
-    let model = ErrorModel {
-        varying: Varying { directions: Some(Directions::new(vec![a, c])), terms: Vec::new() },
-        ..ErrorModel::default()
-    };
+    let model = ErrorModel::default()
+        .with_varying(Varying { directions: Some(Directions::new(vec![a, c])), terms: Vec::new() });
     let (calibrated, fit) =
         calibrate_model(&machine, &train, &model, exact(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
     let names: Vec<&str> = fit.pieces.iter().map(|p| p.name.as_str()).collect();
@@ -245,11 +244,9 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
             part(Slot::After(j), behind, Feature::position(j).times(Feature::position(j))),
             part(Slot::Reading, Twist::from_array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), Feature::position(last)),
         ];
-        let model = ErrorModel {
-            varying: Varying { directions: None, terms },
-            dead_bands: vec![Some(0.0); machine.commands().len()],
-            ..ErrorModel::default()
-        };
+        let model = ErrorModel::default()
+            .with_varying(Varying { directions: None, terms })
+            .with_dead_bands(vec![Some(0.0); machine.commands().len()]);
         let (_, fit) = calibrate_model(&machine, &recordings, &model, exact(), &|_| {})
             .unwrap_or_else(|e| panic!("{name}: {e}"));
         let rms = fit.rms.m.expect("lengths").geometric;
@@ -265,11 +262,9 @@ fn samples_are_picked_evenly_from_every_piece_and_the_others_judge() {
     let machine = common::machine("ac_table_tilting");
     let none = |_: &[f64], _: &[i8]| vec![Twist::zero(0.0); machine.dyads().len()];
     let recordings = open(&machine, &record(&machine, &path(&machine, 1000), &none));
-    let model = ErrorModel {
-        varying: Varying { directions: Some(Directions::new(vec![3, 4])), terms: Vec::new() },
-        samples: Some(40),
-        ..ErrorModel::default()
-    };
+    let model = ErrorModel::default()
+        .with_varying(Varying { directions: Some(Directions::new(vec![3, 4])), terms: Vec::new() })
+        .with_samples(40);
     let (_, fit) =
         calibrate_model(&machine, &recordings, &model, exact(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(fit.pieces.len(), 4);

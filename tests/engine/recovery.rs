@@ -1,7 +1,7 @@
 //! Simulate, calibrate, recover: what an identification calls identified lies within four standard errors of the truth.
 
 use crate::common;
-use kincal::identify::{Fit, Loss, CalibrateOptions, Solver, calibrate};
+use kincal::identify::{CalibrateOptions, Fit, Loss, Solver, calibrate};
 use kincal::lie::Vec3;
 use kincal::machine::Tolerance;
 use kincal::predict::predict;
@@ -131,8 +131,8 @@ fn predictions_at_new_poses_are_as_good_as_the_noise_allows_with_deviations_of_f
                 Recording::from_bytes("r.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))
             };
             let learnt = [record(&instrument, seed + 2)];
-            let (calibrated, fit) =
-                calibrate(&machine, &learnt, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+            let (calibrated, fit) = calibrate(&machine, &learnt, CalibrateOptions::default())
+                .unwrap_or_else(|e| panic!("{name}: {e}"));
             let noise = instrument.noise.m;
             (instrument.noise.m, instrument.noise.rad) = (0.0, 0.0);
             let new = record(&instrument, seed + 4);
@@ -174,7 +174,7 @@ fn gross_outliers_are_told_and_do_not_bend_the_fit() {
     let bytes = spoilt.join("\n").into_bytes();
     let recordings = [Recording::from_bytes("spoilt.csv", bytes, &machine).unwrap_or_else(|e| panic!("{e}"))];
     for loss in [Loss::Huber { k: 1.345 }, Loss::Tukey { c: 4.685 }, Loss::default()] {
-        let options = CalibrateOptions { loss, ..CalibrateOptions::default() };
+        let options = CalibrateOptions::default().with_loss(loss);
         let (_, fit) = calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(fit.down_weighted, 6, "{loss:?}");
         assert_eq!(fit.suspects.len(), 6);
@@ -194,8 +194,13 @@ fn the_named_solvers_do_what_their_names_say() {
     let csv = recording(&truth, &instrument, &random_commands(&machine, 600, 4), &header, 5);
     let recordings =
         [Recording::from_bytes("d.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))];
-    let run =
-        |solver| calibrate(&machine, &recordings, CalibrateOptions { solver, loss: Loss::Squares, prior: false });
+    let run = |solver| {
+        calibrate(
+            &machine,
+            &recordings,
+            CalibrateOptions::default().with_solver(solver).with_loss(Loss::Squares).with_prior(false),
+        )
+    };
     let rms = |solver| run(solver).map(|(_, fit)| fit.rms.m.expect("lengths").geometric);
     let best = rms(Solver::LevenbergMarquardt).unwrap_or_else(|e| panic!("{e}"));
     // Damping only delays in these directions; truncation at 1e-9 cuts nothing that is seen.
@@ -226,7 +231,7 @@ fn noise_of_clean_data_is_found_the_same_under_every_loss() {
             [Recording::from_bytes("clean.csv", csv.into_bytes(), &machine)
                 .unwrap_or_else(|e| panic!("{e}"))];
         let sigma = |loss: Loss| {
-            let options = CalibrateOptions { loss, ..CalibrateOptions::default() };
+            let options = CalibrateOptions::default().with_loss(loss);
             calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}")).1.recordings[0].sigma
         };
         let squares = sigma(Loss::Squares);

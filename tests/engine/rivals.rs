@@ -1,7 +1,7 @@
 //! Rivals: schemes that must agree where they say the same, a filter that must end where least squares ends, and the harness.
 
 use crate::common;
-use kincal::identify::{Loss, CalibrateOptions, Solver, calibrate};
+use kincal::identify::{CalibrateOptions, Loss, Solver, calibrate};
 use kincal::lie::{Twist, Vec3};
 use kincal::recording::Recording;
 use kincal::rivals::{Arena, Form, Kalman, KalmanOptions, Rival, Scheme, Step, Tuning, against_truth, split};
@@ -78,7 +78,7 @@ fn the_local_scheme_is_the_fixed_damping_of_calibrate() {
     let scheme = Scheme { form: Form::Local, step: Step::Damped { tau: 1e-3 }, steps: 12 };
     let ours = fit(Rival::Scheme(scheme), &machine, &recordings);
     let solver = Solver::FixedDamping { tau: 1e-3, steps: 12 };
-    let options = CalibrateOptions { solver, loss: Loss::Squares, prior: false };
+    let options = CalibrateOptions::default().with_solver(solver).with_loss(Loss::Squares).with_prior(false);
     let theirs = fit(Rival::Local(options), &machine, &recordings);
     for (a, b) in ours.deviations().iter().zip(theirs.deviations()) {
         let d = *a - *b;
@@ -116,7 +116,7 @@ fn a_scheme_refuses_readings_of_a_single_joint() {
 
 /// Largest difference of two machines' deviations in units of standard errors of the batch, and of those errors.
 fn difference(machine: &Machine, recordings: &[Recording], options: KalmanOptions) -> (f64, f64) {
-    let batch = CalibrateOptions { loss: Loss::Squares, ..CalibrateOptions::default() };
+    let batch = CalibrateOptions::default().with_loss(Loss::Squares);
     let (_, report) = calibrate(machine, recordings, batch).unwrap_or_else(|e| panic!("{e}"));
     let declared = fit(Rival::Declared, machine, recordings);
     let mut filter = Kalman::new(machine, options).with_setups(&declared);

@@ -2,9 +2,9 @@
 
 use crate::common;
 use crate::common::random::Random;
-use kincal::diagnose::{Companion, Diagnosis, DiagnoseOptions, diagnose};
+use kincal::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
-use kincal::identify::{Loss, CalibrateOptions, fit_setup};
+use kincal::identify::{CalibrateOptions, Loss, fit_setup};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::{CalibratedMachine, Machine};
@@ -104,8 +104,10 @@ fn a_slip_without_a_clock_is_dated_by_the_order_of_samples() {
     assert!((69.0..=70.0).contains(&at.value), "{at:?}");
 
     // The model dates it in the same recordings; of one of them alone as well.
-    let model =
-        said.model(&machine, &all, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}")).to_ron();
+    let model = said
+        .model(&machine, &all, CalibrateOptions::default(), &|_| {})
+        .unwrap_or_else(|e| panic!("{e}"))
+        .to_ron();
     let model = CalibratedMachine::parse("slipped.ron", &model).unwrap_or_else(|e| panic!("{e}"));
     for recording in &all {
         let rms = predict(&model, recording, None).unwrap_or_else(|e| panic!("{e}")).rms.m;
@@ -142,11 +144,12 @@ fn zeros_of_one_axis_that_come_anew_bring_those_of_the_others_into_the_model() {
     assert_eq!(names(&said), [("homing_error", joint(1).as_str())]);
     let companions = said.companions.clone();
     let comes_along =
-        |at: String| companions.contains(&Companion { effect: "homing_error".into(), at, of_set_up: true });
+        |at: String| companions.iter().any(|c| c.effect == "homing_error" && c.at == at && c.of_set_up);
     assert!(comes_along(joint(2)) && !comes_along(joint(1)), "{companions:?}");
 
     // The file has them, and a new set-up finds all of them again.
-    let model = said.model(&machine, known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let model =
+        said.model(&machine, known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(model.effects().len(), 1 + companions.len());
     let found = fit_setup(&model, new, Loss::Squares).unwrap_or_else(|e| panic!("{e}"));
     let rms = predict(&found, &new[0], None).unwrap_or_else(|e| panic!("{e}")).rms.m;
@@ -223,7 +226,8 @@ fn ground_that_gives_way_belongs_to_its_set_up_and_is_found_again_in_a_new_one()
         assert!(rms.r#final < 45e-6 && rms.geometric > 1.5 * rms.r#final, "{one:?}");
     }
     assert_eq!(said.set_ups_left_out.len(), 2);
-    let model = said.model(&machine, known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let model =
+        said.model(&machine, known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
     let model = CalibratedMachine::parse("ground.ron", &model.to_ron()).unwrap_or_else(|e| panic!("{e}"));
     let found = fit_setup(&model, new, Loss::Squares).unwrap_or_else(|e| panic!("{e}"));
     let again = CalibratedMachine::parse("again.ron", &found.to_ron()).unwrap_or_else(|e| panic!("{e}"));

@@ -4,7 +4,7 @@ use crate::common;
 use crate::common::random::Random;
 use kincal::CalibratedMachine;
 use kincal::Machine;
-use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use kincal::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
 use kincal::feature::{Binding, Expression, Feature, as_seen_in, samples_of};
 use kincal::predict::predict;

@@ -90,8 +90,9 @@ fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_
         assert_eq!(still, [("rests.csv", "x", side)]);
 
         // But for a sample or two in the dead band at each reversal the model is as good as the noise; what it foretells of that recording needs to be told the side.
-        let model =
-            said.model(&machine, &known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+        let model = said
+            .model(&machine, &known, CalibrateOptions::default(), &|_| {})
+            .unwrap_or_else(|e| panic!("{e}"));
         let noise = 3f64.sqrt() * 1e-6;
         let last = said.rms.m.expect("lengths").r#final;
         assert!((0.95 * noise..1.15 * noise).contains(&last), "{last}");

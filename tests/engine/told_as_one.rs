@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::common;
 use crate::common::random::normals;
-use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use kincal::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 

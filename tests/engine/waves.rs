@@ -81,7 +81,8 @@ fn periods_are_off_by_as_much_as_is_said() {
     let off = |k: u32| {
         let period = 6.0 + 0.731 * f64::from(k);
         let recording = recording(&machine, period, 0.9 * f64::from(k), 77 + 13 * u64::from(k));
-        let said = diagnose(&machine, &[recording], &Library::standard(), &DiagnoseOptions::default(), &|_| {});
+        let said =
+            diagnose(&machine, &[recording], &Library::standard(), &DiagnoseOptions::default(), &|_| {});
         let said = said.unwrap_or_else(|e| panic!("{e}"));
         let [finding] = &said.findings[..] else { panic!("{period} mm: {:?}", said.findings) };
         let found = finding.coefficients.iter().find(|c| c.name == "period").expect("a period");

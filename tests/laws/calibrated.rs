@@ -18,8 +18,8 @@ fn calibrated_file_of_every_machine_comes_back_and_predicts_the_same() {
         let csv = recording(&truth, &instrument, &random_commands(&machine, 120, 5), &header, 6);
         let recordings = [Recording::from_bytes("r.csv", csv.into_bytes(), &machine)
             .unwrap_or_else(|e| panic!("{name}: {e}"))];
-        let (calibrated, fit) =
-            calibrate(&machine, &recordings, CalibrateOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let (calibrated, fit) = calibrate(&machine, &recordings, CalibrateOptions::default())
+            .unwrap_or_else(|e| panic!("{name}: {e}"));
         let text = calibrated.to_ron();
         let again = CalibratedMachine::parse("again.ron", &text).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(again.machine(), calibrated.machine(), "{name}");

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::common;
-use kincal::compensate::{Model, CompensateOptions, Report, Setup, compensate_text, compensate_with};
+use kincal::compensate::{CompensateOptions, Model, Report, Setup, compensate_text, compensate_with};
 use kincal::lie::{Twist, Vec3};
 use kincal::nc::{Program, State};
 use kincal::simulate::random_deviations;
@@ -38,7 +38,8 @@ fn with_setup(
 }
 
 fn message(calibrated: &CalibratedMachine, text: &str) -> String {
-    let refused = compensate_text(calibrated, "part.nc", text, &Setup::default(), &CompensateOptions::default());
+    let refused =
+        compensate_text(calibrated, "part.nc", text, &Setup::default(), &CompensateOptions::default());
     let error = refused.err().unwrap_or_else(|| panic!("corrected:\n{text}"));
     format!("{error} | {}", error.mend())
 }
@@ -116,7 +117,7 @@ fn inch_programs_are_corrected_in_inches() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let metric = "G21\nG0 X50.8 Y-25.4 Z12.7 A40 C10\n";
     let inch = "G20\nG0 X2. Y-1. Z.5 A40 C10\n";
-    let decimals = CompensateOptions { decimals: Some(6), ..CompensateOptions::default() };
+    let decimals = CompensateOptions::default().with_decimals(6);
     let (a, b) = (run(&calibrated, metric, &decimals).0, run(&calibrated, inch, &decimals).0);
     for (mm, inch) in targets(&a, &AXES)[0].iter().zip(&targets(&b, &AXES)[0]).take(3) {
         assert!((mm - 25.4 * inch).abs() < 3e-5, "{a}{b}");
@@ -153,7 +154,7 @@ fn arcs_become_lines_within_the_tolerance_of_the_exact_arc() {
     for tolerance in [2e-6, 2e-5] {
         for (start, block, plane, centre, from, sweep, r, rest) in cases {
             let text = format!("G21 G90\nG0 {start} A40 C10\n{block} F800 (arc)\nG1 X1 Y2 Z3\n");
-            let options = CompensateOptions { arcs: Some(tolerance), ..CompensateOptions::default() };
+            let options = CompensateOptions::default().with_arcs(tolerance);
             let (out, report) = run(&calibrated, &text, &options);
             assert_eq!(report.split_arcs, 1);
             assert!(report.largest_arc_m.value <= tolerance, "{block}: {:?}", report.largest_arc_m);
@@ -186,7 +187,7 @@ fn arcs_become_lines_within_the_tolerance_of_the_exact_arc() {
 fn the_motion_in_force_survives_an_arc_that_became_lines() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let text = "G21 G90 G0 X30 Y0 Z5 A40 C10\nG3 X0 Y30 I-30 J0 F80\nX-30 Y0 I0 J-30\nG1 X0\n";
-    let (out, report) = run(&calibrated, text, &CompensateOptions { arcs: Some(1e-4), ..CompensateOptions::default() });
+    let (out, report) = run(&calibrated, text, &CompensateOptions::default().with_arcs(1e-4));
     assert_eq!(report.split_arcs, 2);
     // The second arc named no motion of its own.
     assert_eq!(out.matches("G1 ").count(), 3, "{out}");
@@ -198,7 +199,7 @@ fn the_motion_in_force_survives_an_arc_that_became_lines() {
 fn under_inverse_time_every_line_has_its_share() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let text = "G21 G90 G0 X30 Y0 Z5 A40 C10\nG93 G3 X0 Y30 I-30 J0 F2.5\nG1 X4 F7\n";
-    let (out, report) = run(&calibrated, text, &CompensateOptions { arcs: Some(1e-4), ..CompensateOptions::default() });
+    let (out, report) = run(&calibrated, text, &CompensateOptions::default().with_arcs(1e-4));
     let lines: Vec<&str> = out.lines().collect();
     let wanted = format!("F{}", 2.5 * report.arc_lines as f64);
     let count = report.arc_lines as usize;
@@ -212,7 +213,7 @@ fn a_split_move_leaves_less_between_its_ends() {
     let text = "G21 G90 G0 X-200 Y-200 Z5 A20 C-170\nG1 X250 Y200 Z60 A80 C170 F900 M5\n";
     let (_, whole) = run(&calibrated, text, &CompensateOptions::default());
     assert!(whole.largest_mid_line_m.value > 5e-5, "{whole:?}");
-    let options = CompensateOptions { split: Some(1e-5), decimals: Some(4), ..CompensateOptions::default() };
+    let options = CompensateOptions::default().with_split(1e-5).with_decimals(4);
     let (out, split) = run(&calibrated, text, &options);
     assert_eq!(split.split_moves, 1);
     assert!(split.largest_mid_line_m.value < 1.5e-5, "{:?}", split.largest_mid_line_m);
@@ -228,7 +229,7 @@ fn a_split_move_leaves_less_between_its_ends() {
 #[test]
 fn frames_compose() {
     let calibrated = erroneous("bc_table_tilting", 1.0);
-    let options = CompensateOptions { decimals: Some(6), ..CompensateOptions::default() };
+    let options = CompensateOptions::default().with_decimals(6);
     let plain = "G710 G90\nG0 X10 Y-20 Z30 B30 C40\nTRAORI\nG1 X60 Y35 Z12\n";
     let framed =
         "G710 G90\nG0 X10 Y-20 Z30 B30 C40\nTRAORI\nTRANS X10 Y5\nAROT Z90\nATRANS Z2\nG1 X30 Y-50 Z10\n";
@@ -255,7 +256,7 @@ fn frames_compose() {
 #[test]
 fn offsets_tools_and_machine_zero_enter_the_correction() {
     let calibrated = erroneous("bc_head_table", 1.0);
-    let options = CompensateOptions { decimals: Some(6), ..CompensateOptions::default() };
+    let options = CompensateOptions::default().with_decimals(6);
     let setup = r#"Setup(zero: {"X": 7}, tools: {"4": 90}, work_offsets: {
         "G54": {"X": 107, "Z": -30, "C": 25}, "G55": {"X": 57, "Y": 10, "Z": -30, "C": 25}})"#;
     let one = "G54 T4 M6\nG43 H4\nG0 X10 Y0 Z20 B30 C15\n";
@@ -426,7 +427,7 @@ mod data_sets {
         for name in ["keychain", "axis_cross"] {
             let path = common::data(&format!("data/spinner-u5-nc/{name}.mpf"));
             let text = std::fs::read_to_string(path).expect("readable");
-            let options = CompensateOptions { arcs: Some(5e-6), ..CompensateOptions::default() };
+            let options = CompensateOptions::default().with_arcs(5e-6);
             let (out, report) = with_setup(&calibrated, &text, setup, &options);
             assert!(report.split_arcs > 50 && report.largest_arc_m.value <= 5e-6, "{name}: {report:?}");
             assert!(report.largest_left_m.value < 2e-6, "{name}: {:?}", report.largest_left_m);
@@ -445,7 +446,7 @@ fn an_arc_names_the_axes_that_it_needs_or_is_refused() {
     let calibrated = erroneous("ac_table_tilting", 1.0);
     let (machine, actual) = (calibrated.machine(), calibrated.chain());
     let text = "G21 G90\nG0 X30 Y0 A40 C10\nG1 X31 F800\nX30\nG3 X0 Y30 I-30 J0 F800\n";
-    let options = CompensateOptions { arcs: Some(1e-5), ..CompensateOptions::default() };
+    let options = CompensateOptions::default().with_arcs(1e-5);
     // Z stands somewhere, and no word says where.
     let refused =
         compensate_text(&calibrated, "part.nc", text, &Setup::default(), &options).expect_err("no Z");

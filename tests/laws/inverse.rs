@@ -2,7 +2,7 @@
 
 use crate::common;
 use kincal::chain::Chain;
-use kincal::inverse::{Goal, Inverse, Mode, InverseOptions, Outcome, Solution};
+use kincal::inverse::{Goal, Inverse, InverseOptions, Mode, Outcome, Solution};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::machine::JointKind;
 use kincal::simulate::{random_commands, random_deviations};
@@ -57,7 +57,7 @@ fn every_five_axis_machine_corrects_its_errors_in_three_steps() {
         let chain = erroneous(&machine, 1.0, 4);
         let (mut reached, mut all) = (0, 0);
         for q in random_commands(&machine, 300, 11).into_iter().filter(|q| inside(&machine, q)) {
-            let three = inverse.with_options(InverseOptions { steps: 3, ..InverseOptions::default() });
+            let three = inverse.with_options(InverseOptions::default().with_steps(3));
             let solution = three.solve(&chain, &goal(&machine, &q), &q, &all_free(&machine));
             assert!(solution.position_left_m < 1e-9, "{name}: {solution:?}");
             match solution.outcome {

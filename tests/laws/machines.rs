@@ -202,11 +202,10 @@ fn dyads() -> impl Strategy<Value = Vec<(Dyad, Option<JointParts>)>> {
     let mass = proptest::option::of((0.0..500.0, vector(2.0)))
         .prop_map(|m| m.map(|(mass, centre)| MassPoint { mass, centre }));
     let dyad = (vector(2.0), vector(1.5), mass, proptest::option::of(tolerance())).prop_map(
-        |(at, rotation, mass, tolerance)| Dyad {
-            placement: Placement { at, rotation },
-            mass,
-            tolerance,
-            ..Dyad::new("")
+        |(at, rotation, mass, tolerance)| {
+            let mut dyad = Dyad::new("").placed(Placement { at, rotation });
+            (dyad.mass, dyad.tolerance) = (mass, tolerance);
+            dyad
         },
     );
     proptest::collection::vec((dyad, proptest::option::of(joint_parts())), 1..7)
@@ -235,7 +234,9 @@ fn machines() -> impl Strategy<Value = Machine> {
                         .map(|(leader, f)| BTreeMap::from([(leader.clone(), f)]));
                     leader.get_or_insert_with(|| joint_name.clone());
                     let nc = sign.map(|sign| NcWord { address: format!("A{i}"), sign });
-                    Joint { travel, follows, nc, ..Joint::new(joint_name, kind, axis) }
+                    let mut joint = Joint::new(joint_name, kind, axis);
+                    (joint.travel, joint.follows, joint.nc) = (travel, follows, nc);
+                    joint
                 });
                 named.push(dyad);
             }
@@ -383,7 +384,7 @@ fn aligned_rms(machine: &Machine, file: &Path, marker: Option<Vector3<f64>>) -> 
     let chain = Chain::nominal(machine);
     let samples: Vec<_> = positions(machine, file)
         .into_iter()
-        .map(|(q, measured)| (chain.w_from_t(&q).to_isometry(), measured))
+        .map(|(q, measured)| (nalgebra::Isometry3::from(chain.w_from_t(&q)), measured))
         .collect();
     let n = samples.len() as f64;
     let mut point = marker.unwrap_or_default();

@@ -369,6 +369,7 @@ fn every_measurement_is_read_back_as_the_chain_has_it() {
                     }
                     Sensor::Displacement { .. } => vec![along.dot(p)],
                     Sensor::Joint { .. } => vec![q[1] + 500e-6],
+                    other => panic!("{other:?}"),
                 };
                 let got = &chunk.values[k * expected.len()..(k + 1) * expected.len()];
                 for (a, b) in got.iter().zip(&expected) {

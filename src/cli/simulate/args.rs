@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
 use crate::lie::Vec3;
 use crate::machine::FileUnits;
 use crate::simulate::Scatter;
+use clap::ValueEnum;
 
 use super::amounts::{self as amounts, Held, Rate};
 use crate::cli::Common;

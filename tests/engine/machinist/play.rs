@@ -53,11 +53,9 @@ fn with_play(machine: &Machine, rotary: &[usize], seed: u64) -> (Plant, Vec<Stri
     let measured =
         Recording::from_bytes("rec.csv", texts[0].as_bytes(), machine).unwrap_or_else(|e| panic!("{e}"));
     // The path's steps are fine where an axis turns round.
-    let model = ErrorModel {
-        varying: Varying { directions: Some(Directions::new(rotary.to_vec())), terms: Vec::new() },
-        dead_bands: vec![Some(1e-7); 5],
-        ..ErrorModel::default()
-    };
+    let model = ErrorModel::default()
+        .with_varying(Varying { directions: Some(Directions::new(rotary.to_vec())), terms: Vec::new() })
+        .with_dead_bands(vec![Some(1e-7); 5]);
     let (pieces, _) = calibrate_model(machine, &[measured], &model, Fitting::default(), &|_| {})
         .unwrap_or_else(|e| panic!("{e}"));
     let pieces = CalibratedMachine::parse("pieces.ron", &pieces.to_ron()).unwrap_or_else(|e| panic!("{e}"));

@@ -98,7 +98,7 @@ proptest! {
     fn any_text_is_corrected_or_refused(blocks in prop::collection::vec("\\PC{0,20}", 0..12)) {
         let calibrated = erroneous("bc_table_tilting", 1.0);
         let setup = Setup::default();
-        let options = CompensateOptions { arcs: Some(0.05), split: Some(0.05), ..CompensateOptions::default() };
+        let options = CompensateOptions::default().with_arcs(0.05).with_split(0.05);
         if let Err(error) = compensate_text(&calibrated, "any.nc", blocks.join("\n"), &setup, &options) {
             prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
         }
@@ -113,7 +113,7 @@ proptest! {
     ]), 0..60)) {
         let calibrated = erroneous("bc_table_tilting", 1.0);
         let setup = Setup::parse("s.ron", r#"Setup(tools: {"1": 50}, work_offsets: {"G54": {"X": 3}})"#).expect("a set-up");
-        let options = CompensateOptions { arcs: Some(0.05), split: Some(0.05), ..CompensateOptions::default() };
+        let options = CompensateOptions::default().with_arcs(0.05).with_split(0.05);
         if let Err(error) = compensate_text(&calibrated, "any.nc", tokens.join(" "), &setup, &options) {
             prop_assert!(!error.to_string().is_empty() && !error.mend().is_empty());
         }

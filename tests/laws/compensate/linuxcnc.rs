@@ -46,7 +46,7 @@ fn what_is_written_is_read_with_the_same_moves() {
     assert!(before.0 > 390);
     // With arcs there are as many lines as the report says.
     let arcs = "%\nG21 G90 G17 G54\nT1 M6\nG43 H1\nG0 X0 Y0 Z10 A20 C0\nG2 X20 Y0 I10 J0 F300\nG3 X20 Y0 Z8 I-10 J5 P2\nG18 G2 X30 Z8 R8\nG19 G3 Y8 Z16 K8 J0\nG1 X1\nM2\n%\n";
-    let options = CompensateOptions { arcs: Some(5e-6), ..CompensateOptions::default() };
+    let options = CompensateOptions::default().with_arcs(5e-6);
     let (out, report) = with_setup(&calibrated, arcs, setup, &options);
     assert_eq!(report.split_arcs, 4);
     assert_eq!(canonical_moves(arcs), (2, 4));

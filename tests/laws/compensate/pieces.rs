@@ -84,7 +84,7 @@ fn with_play() -> (Machine, TwoPieces, String) {
 
 #[test]
 fn the_first_direction_of_an_axis_follows_from_where_it_starts_or_from_its_first_known_way() {
-    let options = CompensateOptions { arcs: Some(1e-3), ..CompensateOptions::default() };
+    let options = CompensateOptions::default().with_arcs(1e-3);
     // By set-up and program (@: the axis): thousandths that are added to its words in turn, and lines with an unknown way.
     let cases: [(&str, &str, &[i64], &[usize]); 9] = [
         // Forward from the start, and from the other side.

@@ -100,18 +100,18 @@ proptest! {
     #[test]
     fn isometry_there_and_back(x in twist(6.0)) {
         let t = Pose::exp(Twist::from_array(x));
-        let isometry: Isometry3<f64> = t.to_isometry();
+        let isometry: Isometry3<f64> = t.into();
         assert_near(isometry.to_homogeneous().as_slice(), homogeneous(t).as_slice(), 1e-14);
         assert_law::<f64>(&Pose::from(isometry), &t, 1e-14);
-        let again = Pose::from(isometry).to_isometry();
+        let again = Isometry3::from(Pose::from(isometry));
         assert_near(again.to_homogeneous().as_slice(), isometry.to_homogeneous().as_slice(), 1e-14);
     }
 
     #[test]
     fn isometry_product_is_pose_product(x in twist(6.0), y in twist(6.0)) {
         let (a, b) = (Pose::exp(Twist::from_array(x)), Pose::exp(Twist::from_array(y)));
-        assert_law::<f64>(&Pose::from(a.to_isometry() * b.to_isometry()), &(a * b), 1e-13);
-        assert_law::<f64>(&Pose::from(a.to_isometry().inverse()), &a.inverse(), 1e-13);
+        assert_law::<f64>(&Pose::from(Isometry3::from(a) * Isometry3::from(b)), &(a * b), 1e-13);
+        assert_law::<f64>(&Pose::from(Isometry3::from(a).inverse()), &a.inverse(), 1e-13);
     }
 
     #[test]

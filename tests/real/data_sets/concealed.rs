@@ -5,7 +5,7 @@
 #![allow(dead_code)]
 
 use kincal::Machine;
-use kincal::diagnose::{Diagnosis, DiagnoseOptions, diagnose};
+use kincal::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use kincal::effects::Library;
 use kincal::recording::Recording;
 

@@ -1,7 +1,7 @@
 //! The solver reaches the optimum on 42 redundant parameters, on a workload where two popular solvers stop at 3 and 11 times it.
 
 use crate::common;
-use kincal::identify::{Loss, CalibrateOptions, Solver, calibrate};
+use kincal::identify::{CalibrateOptions, Loss, Solver, calibrate};
 use kincal::recording::Recording;
 
 /// Sum of squares at the optimum, m²: minimum-norm Gauss-Newton steps of a dense SVD in another language, repeated until the sum no
@@ -19,7 +19,8 @@ fn optimum_of_42_redundant_parameters_is_reached() {
     let recordings =
         [Recording::from_bytes("w3.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))];
     for solver in [Solver::LevenbergMarquardt, Solver::RankTruncation { cut: 1e-8 }] {
-        let options = CalibrateOptions { solver, loss: Loss::Squares, prior: false };
+        let options =
+            CalibrateOptions::default().with_solver(solver).with_loss(Loss::Squares).with_prior(false);
         let (_, fit) = calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}"));
         let rms = fit.rms.m.expect("lengths").geometric;
         let sum = rms * rms * fit.samples as f64;

@@ -49,11 +49,11 @@ const Z: Vec3<f64> = Vec3([0.0, 0.0, 1.0]);
 const ZERO: Vec3<f64> = Vec3([0.0; 3]);
 
 fn fixed(frame: &str, at: Vec3<f64>) -> Dyad {
-    Dyad { placement: Pose::translation(at).into(), ..Dyad::new(frame) }
+    Dyad::new(frame).at(at)
 }
 
 fn joint(frame: &str, at: Vec3<f64>, kind: JointKind, axis: Vec3<f64>) -> Dyad {
-    Dyad { joint: Some(Joint::new(frame, kind, axis)), ..fixed(frame, at) }
+    fixed(frame, at).with_joint(Joint::new(frame, kind, axis))
 }
 
 fn turns(frame: &str, at: Vec3<f64>, axis: Vec3<f64>) -> Dyad {
@@ -206,7 +206,7 @@ fn modified_dh(links: [(f64, f64, f64); 6], row: &Row) -> Pose<f64> {
     for (i, (alpha, a, d)) in links.into_iter().enumerate() {
         let place = Pose::translation(behind) * Pose::turn(X, alpha) * Pose::translation(Vec3([a, 0.0, 0.0]));
         let frame = format!("q{i}");
-        tool.push(Dyad { placement: place.into(), ..turns(&frame, ZERO, Z) });
+        tool.push(turns(&frame, ZERO, Z).placed(place));
         behind = Vec3([0.0, 0.0, d]);
     }
     tool.push(fixed("t", behind));

@@ -4,7 +4,7 @@
 //! `cargo run --release --example measure -- terms SET TERMS` fits a set with other effects.
 
 use kincal::effects::Library;
-use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model};
+use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};
 use kincal::variation::Varying;
 
 use super::sets::{SETS, Set};
@@ -78,7 +78,7 @@ fn asked_of(name: &str) -> &'static str {
 fn coefficients(name: &str, asked: &str) -> Vec<f64> {
     let set = set(name);
     let (varying, _) = terms(set, &Library::standard(), asked);
-    let model = ErrorModel { varying, ..ErrorModel::default() };
+    let model = ErrorModel::default().with_varying(varying);
     let found = calibrate_model(&set.machine, &set.whole(), &model, CalibrateOptions::default(), &|_| {});
     let (_, fit) = found.unwrap_or_else(|e| panic!("{e}"));
     fit.coefficients.iter().map(|c| c.value).collect()

@@ -6,7 +6,7 @@
 use kincal::CalibratedMachine;
 use kincal::effects::{Candidate, Library, RecordingFacts};
 use kincal::feature::samples_of;
-use kincal::identify::{ErrorModel, CalibrateOptions, calibrate_model, fit_setup};
+use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model, fit_setup};
 use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::variation::{Part, Term, Varying};
@@ -118,7 +118,7 @@ pub struct Figures {
 
 /// Calibrates a set with these terms, on all rows and on each part in turn.
 pub fn figures(set: &Set, varying: &Varying, names: &[String]) -> Figures {
-    let model = ErrorModel { varying: varying.clone(), ..ErrorModel::default() };
+    let model = ErrorModel::default().with_varying(varying.clone());
     let calibrated = |recordings: &[Recording]| {
         calibrate_model(&set.machine, recordings, &model, CalibrateOptions::default(), &|_| {})
             .unwrap_or_else(|e| panic!("{}: {e}", set.name))
