@@ -82,7 +82,7 @@ fn finding(found: &Finding) -> String {
     let others: Vec<String> =
         found.confusable_with.iter().map(|c| format!("`{}` {}", c.effect, c.at)).collect();
     let or = if others.is_empty() { String::new() } else { format!(", or {}", others.join(", ")) };
-    format!("`{}` {}{size} ({:.2}{or})", found.effect, found.at, found.probability)
+    format!("`{}` {}{size} ({:.2}{or})", found.name(), found.at, found.probability)
 }
 
 /// Each trial of the Hilti JaiBot predicted by what the three others say.

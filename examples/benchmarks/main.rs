@@ -121,7 +121,7 @@ fn run(arguments: &Arguments) -> Outcome<bool> {
         }
         return Ok(true);
     }
-    let mut page = arguments.report.as_deref().map(Page::open).transpose()?;
+    let page = arguments.report.as_deref().map(Page::new);
     let data = sets::Data::new(arguments.data.as_deref());
     let mut left: Vec<String> = Vec::new();
     for section in chosen(&arguments.sections)? {
@@ -129,8 +129,8 @@ fn run(arguments: &Arguments) -> Outcome<bool> {
         eprintln!("{}: {}", section.name, section.what);
         match (section.measure)(&data) {
             Ok(body) => {
-                let body = format!("## {}\n\n{body}", title(section.what));
-                match &mut page {
+                let body = format!("## {}\n\n    {}\n\n{body}", title(section.what), command(section));
+                match &page {
                     Some(page) => page.put(section.name, &command(section), &body)?,
                     None => println!("{body}\n"),
                 }

@@ -6,29 +6,30 @@ use std::path::{Path, PathBuf};
 /// The page's own first lines, where it does not exist yet.
 const HEAD: &str = "# Benchmarks\n";
 
-/// Text of a page.
+/// A page in a file.
 pub struct Page {
     path: PathBuf,
-    text: String,
 }
 
 impl Page {
-    /// The page as it stands; a new one where nothing is there.
-    pub fn open(path: &Path) -> io::Result<Self> {
-        let text = match std::fs::read_to_string(path) {
+    /// Of this file, which need not exist yet.
+    pub fn new(path: &Path) -> Self {
+        Page { path: path.into() }
+    }
+
+    /// Puts `body` in the place of the part `name`, or at the end where there is none, and the page in the place of the file.
+    ///
+    /// The page is read anew, so that what has been written to it since the last part stays.
+    pub fn put(&self, name: &str, command: &str, body: &str) -> io::Result<()> {
+        let text = match std::fs::read_to_string(&self.path) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => HEAD.into(),
             Err(error) => return Err(error),
         };
-        Ok(Page { path: path.into(), text })
-    }
-
-    /// Puts `body` in the place of the part `name`, or at the end where there is none, and the page in the place of the file.
-    pub fn put(&mut self, name: &str, command: &str, body: &str) -> io::Result<()> {
-        self.text = with_part(&self.text, name, command, body);
         // Beside the page, so that a rename puts the whole of it there or nothing.
         let beside = self.path.with_extension(format!("{}.part", std::process::id()));
-        let written = std::fs::write(&beside, &self.text).and_then(|()| std::fs::rename(&beside, &self.path));
+        let written = std::fs::write(&beside, with_part(&text, name, command, body))
+            .and_then(|()| std::fs::rename(&beside, &self.path));
         if written.is_err() {
             let _ = std::fs::remove_file(&beside);
         }

@@ -181,6 +181,6 @@ pub fn axes(data: &Data) -> Outcome<String> {
     }
     Ok(table.after(
         "RMS on every fourth row, left out in turn. Effects are written as in the section on real arms. The last column is what the page or \
-         report of the recording says, read off by other means.",
+         report of the recording says, read off by other means. Seven rows with a stale channel make up the RMS of the two measuring systems.",
     ))
 }
