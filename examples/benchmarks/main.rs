@@ -83,7 +83,7 @@ const SECTIONS: [Section; 19] = [
     section("new-poses", "simulated machines: predictions at new poses", simulated::new_poses),
     section("jacobians", "analytic Jacobians against automatic differentiation", simulated::jacobians),
     real(section("real-geometry", "real machines: geometry alone", geometry::geometry)),
-    long(real(section("losses", "real machines: robust losses", geometry::losses))),
+    real(section("losses", "real machines: robust losses", geometry::losses)),
     long(real(section("tolerances", "real machines: tolerances as priors", geometry::tolerances))),
     long(real(section("real-arms", "real arms: effects that are given", physics::arms))),
     real(section("real-axes", "real single axes: effects that are given", physics::axes)),
