@@ -121,7 +121,7 @@ fn chain(model: &CalibratedMachine, directions: &[i8], q: &[f64]) -> Chain<f64> 
 fn corrected(model: &CalibratedMachine, path: &[Vec<f64>]) -> Path {
     let machine: &Machine = model.machine();
     let nominal = Chain::nominal(machine);
-    let limits = Limits { within_travel: false, ..Limits::default() };
+    let limits = Limits::default().with_within_travel(false);
     let inverse = Inverse::new(machine).with_mode(Mode::PositionAndAxis).with_options(limits);
     let free = vec![true; machine.commands().len()];
     (path.iter().zip(directions(path)))
