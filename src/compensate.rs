@@ -105,13 +105,14 @@ pub use model::Model;
 pub use options::CompensateOptions;
 pub use report::{
     Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, UnknownWay, Unreached, Unseen,
-    UnseenPattern, Worst,
+    UnseenPattern, UnseenPiece, Worst,
 };
 pub use setup::{Setup, ToolAxis};
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
+pub use crate::nc::Dialect;
 use crate::nc::{Program, State};
 use calibrated::model_of;
 use gaps::{Gaps, is_gap};

@@ -49,7 +49,7 @@ use crate::lie::{Pose, Twist};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::units::Rms;
-use crate::variation::{Variation, Varying};
+use crate::variation::{Directions, MOST_AXES, Variation, Varying};
 use crate::wording;
 use evidence::Sizes;
 use information::Information as Info;
@@ -119,6 +119,36 @@ pub struct ErrorModel {
 }
 
 impl ErrorModel {
+    /// A model for each pattern of directions of travel of these axes, `docs/model.md` (29).
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] where a name is no joint of its own command or comes twice, and where there is none or are too many.
+    pub fn by_direction(machine: &Machine, axes: &[&str]) -> Result<Self> {
+        let refused = |what: String, mend: String| Err(Error::Undetermined { what, mend });
+        let mut commands = Vec::new();
+        for axis in axes {
+            match machine.commands().iter().position(|command| command == axis) {
+                None => {
+                    let what = format!("{} has no axis \"{axis}\" to key a model on", machine.name());
+                    return refused(what, format!("name one of: {}", machine.commands().join(", ")));
+                }
+                Some(command) if commands.contains(&command) => {
+                    return refused(format!("axis \"{axis}\" is named twice"), "name every axis once".into());
+                }
+                Some(command) => commands.push(command),
+            }
+        }
+        if !(1..=MOST_AXES).contains(&commands.len()) {
+            let what = format!(
+                "a model cannot be keyed on {}",
+                wording::count(commands.len() as u64, "axis", "axes")
+            );
+            return refused(what, format!("name 1 to {MOST_AXES} axes"));
+        }
+        let directions = Some(Directions::new(commands));
+        Ok(ErrorModel { varying: Varying { directions, terms: Vec::new() }, ..ErrorModel::default() })
+    }
+
     /// The same with what deviations depend on besides being constant.
     #[must_use]
     pub fn with_varying(mut self, varying: Varying) -> Self {

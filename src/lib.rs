@@ -6,7 +6,7 @@
 //! initial pose `M_j` and a joint `exp(xi_j q_j)`; everything that is wrong with the machine is a small twist `dh_j`
 //! between them (`docs/model.md`, (10) and (11)):
 //!
-//! ```text
+//! ```math
 //! w_from_t = (Π_workpiece M_j exp(dh_j) exp(xi_j q_j))⁻¹ (Π_tool M_j exp(dh_j) exp(xi_j q_j))
 //!
 //! find dh:   minimise  Σ loss((measured - model(dh, q)) / sigma)  +  ½ Σ (dh / tolerance)²
@@ -174,6 +174,8 @@ pub use error::{Error, Place, Result};
 pub use machine::Machine;
 /// The linear algebra of this crate's interface: [`lie`] converts to and from its poses and vectors.
 pub use nalgebra;
+/// Dual numbers: what a [`Scalar`] is besides `f64`, for derivatives of poses by any number that goes in.
+pub use num_dual;
 pub use recording::Recording;
 pub use scalar::Scalar;
 

@@ -171,7 +171,18 @@ pub fn recording(
     extra_header: &[String],
     seed: u64,
 ) -> String {
-    let (plant, nominal, style) = (Plant::new(machine), machine.machine(), Style::si());
+    recording_of(&Plant::new(machine), instrument, commands, extra_header, seed)
+}
+
+/// As [`recording`], of a machine with all that is wrong with it: play remembers from sample to sample.
+pub fn recording_of(
+    plant: &Plant,
+    instrument: &Instrument,
+    commands: &[Vec<f64>],
+    extra_header: &[String],
+    seed: u64,
+) -> String {
+    let (nominal, style) = (plant.machine(), Style::si());
     let at = |(k, q): (usize, &Vec<f64>)| Sample {
         time: k as f64 * 0.01,
         q: q.clone(),

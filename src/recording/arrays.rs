@@ -86,6 +86,11 @@ impl Arrays {
             .line(format!("nominal_length[m]: {nominal_length:?}"))
     }
 
+    /// The same of a bar whose length is found with the rest.
+    pub fn distance_of_unknown_length(d: &[f64]) -> Self {
+        Arrays::new("distance").with("d[m]", d.iter().copied()).line("nominal_length: unknown".into())
+    }
+
     /// Distances of the measured point from the workpiece point, m: a draw-wire, a laser tracer.
     pub fn absolute_distance(r: &[f64]) -> Self {
         Arrays::new("distance").with("r[m]", r.iter().copied())
@@ -147,6 +152,12 @@ impl Arrays {
         self.line(format!("workpiece_point[m]: {x:?},{y:?},{z:?}"))
     }
 
+    /// The direction of gravity in frame `w`, where it is not the machine file's.
+    pub fn gravity(self, gravity_w: Vec3<f64>) -> Self {
+        let [x, y, z] = gravity_w.0;
+        self.line(format!("gravity[w]: {x:?},{y:?},{z:?}"))
+    }
+
     /// Frame `w` is found from nothing.
     pub fn unknown_workpiece_frame(self) -> Self {
         self.line("workpiece_frame: unknown".into())
@@ -169,14 +180,26 @@ impl Arrays {
     /// As [`Recording::open`]; lines and columns are those of the same recording as a file. [`RecordingFault::UnequalArrays`] where one
     /// array is shorter than another.
     pub fn recording(&self, name: &str, machine: &Machine) -> Result<Recording> {
-        let kind = |joint: &str| machine.joints().find(|(_, own)| own.name == joint).map(|(_, own)| own.kind);
-        // A joint that there is not is told by whoever reads.
+        let named = |joint: &str| machine.joints().map(|(_, own)| own).find(|own| own.name == joint);
+        let kind = |joint: &str| named(joint).or_else(|| machine.side_joint(joint)).map(|own| own.kind);
         let unit = |joint: &str| if kind(joint) == Some(JointKind::Revolute) { "rad" } else { "m" };
+        let joints = self.joints.iter().chain(&self.measured_joint).map(|(joint, _)| joint);
+        if let Some(joint) = joints.into_iter().find(|joint| kind(joint).is_none()) {
+            let what = format!("joint \"{joint}\" is none of machine \"{}\"", machine.name());
+            let mend = format!("name one of: {}", machine.commands().join(", "));
+            return Err(Error::mistake(Place::file(name), what, mend));
+        }
         let mut columns: Vec<(String, &[f64])> = Vec::new();
         columns.extend(self.joints.iter().map(|(joint, q)| (format!("{joint}[{}]", unit(joint)), &q[..])));
         let measured = self.measured_joint.iter();
         columns.extend(measured.map(|(joint, q)| (format!("{joint}_meas[{}]", unit(joint)), &q[..])));
         columns.extend(self.columns.iter().map(|(name, values)| (name.clone(), &values[..])));
+        let names = columns.iter().map(|(name, _)| (name, &[',', '"', '\n', '\r'][..]));
+        let lines = self.head.iter().map(|line| (line, &['\n', '\r'][..]));
+        if let Some((text, _)) = names.chain(lines).find(|(text, breaks)| text.contains(*breaks)) {
+            let what = format!("{text:?} has a comma, a quotation mark or a line break in a name");
+            return Err(Error::mistake(Place::file(name), what, "give it a name without"));
+        }
         let samples = columns.first().map_or(0, |(_, values)| values.len());
         if let Some((column, values)) = columns.iter().find(|(_, values)| values.len() != samples) {
             let (column, first) = (column.clone(), columns[0].0.clone());
