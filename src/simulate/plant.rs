@@ -139,7 +139,7 @@ impl Plant {
 
     /// Adds faults: deviations add up, then factors, displacements and twists change the initial poses exactly,
     ///
-    /// ```text
+    /// ```math
     /// M_j exp(dh_j) exp(d_j) exp(xi_j (q_j + offset_j)) exp(-d_j)          d_j: displaced axis
     /// ```
     ///

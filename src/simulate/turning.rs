@@ -45,7 +45,7 @@ pub enum Figure {
     /// A cone frustum (ISO 10791-6 AK4, BK4, CK4). The bar turns about the cone's axis, the tool's axis on the same cone opposite
     /// to it:
     ///
-    /// ```text
+    /// ```math
     /// e = (0, -sin i, cos i)   n = (0, cos i, sin i)   m(u) = n cos u + (1, 0, 0) sin u
     /// bar = length (e sin β + m(u) cos β)     tool = e cos β - m(u + lead) sin β
     /// ```
