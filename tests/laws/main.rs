@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod arrays;
 mod bad_effects;
 mod bad_machines;
 mod calibrated;
@@ -11,6 +12,7 @@ mod compensate;
 mod effects;
 mod effects_in_files;
 mod features;
+mod interface;
 mod inverse;
 mod jacobians;
 mod join;
