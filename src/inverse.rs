@@ -5,6 +5,8 @@
 //! the joints hardly move the tool is held near the start instead of being chased, so that a correction stays
 //! small at a singular pose, and is told.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
@@ -139,7 +141,7 @@ pub struct Solution {
 /// The inverse of the chains of one machine.
 #[derive(Clone, Debug)]
 pub struct Inverse<'a> {
-    machine: &'a Machine,
+    machine: Cow<'a, Machine>,
     mode: Mode,
     options: InverseOptions,
     /// Equations of orientation that the machine has joints for on general poses.
@@ -216,6 +218,15 @@ impl<'a> Inverse<'a> {
     /// In the mode that the machine has joints for: the full pose with six independent freedoms, else
     /// position and tool axis where joints turn the tool axis, else position.
     pub fn new(machine: &'a Machine) -> Self {
+        Inverse::of(Cow::Borrowed(machine))
+    }
+
+    /// The same with a machine of its own.
+    pub fn owning(machine: Machine) -> Inverse<'static> {
+        Inverse::of(Cow::Owned(machine))
+    }
+
+    fn of(machine: Cow<'a, Machine>) -> Self {
         let mut inverse = Inverse {
             machine,
             mode: Mode::Pose,
@@ -260,7 +271,7 @@ impl<'a> Inverse<'a> {
     /// Ranks over general poses: of everything, of orientation, of position, and whether linear joints alone
     /// give position.
     fn ranks(&self) -> (usize, usize, usize, bool) {
-        let chain = Chain::nominal(self.machine);
+        let chain = Chain::nominal(&self.machine);
         let mut rng = StdRng::seed_from_u64(5);
         let count = self.machine.commands().len();
         let free = vec![true; count];
@@ -272,7 +283,7 @@ impl<'a> Inverse<'a> {
         };
         let mut best = (0, 0, 0, false);
         for _ in 0..8 {
-            let q: Vec<f64> = (0..count).map(|c| random_command(self.machine, c, &mut rng)).collect();
+            let q: Vec<f64> = (0..count).map(|c| random_command(&self.machine, c, &mut rng)).collect();
             let look = self.look(&chain, &goal, &q);
             let (turns, shifts) = (self.turn_rows(&look, &free), self.shift_rows(&look, &free));
             let mut all = DMatrix::zeros(turns.nrows() + 3, count);
@@ -337,7 +348,7 @@ impl<'a> Inverse<'a> {
         let mut matrix = DMatrix::zeros(wrenches.len(), free.len());
         let mut row = vec![0.0; free.len()];
         for (k, wrench) in wrenches.iter().enumerate() {
-            look.sweep.command_row(self.machine, *wrench, &mut row);
+            look.sweep.command_row(&self.machine, *wrench, &mut row);
             for c in (0..free.len()).filter(|c| free[*c]) {
                 matrix[(k, c)] = row[c];
             }

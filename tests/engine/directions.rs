@@ -1,13 +1,12 @@
 //! Models keyed on directions of travel on the paper's machine.
 
-use crate::common;
 use crate::common::random::Random;
+use crate::common::{self, aimed};
 use crate::table::{Axes, Bar, Best, SIGMA, Table, path, record};
 use kincal::feature::Feature;
 use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};
 use kincal::lie::Twist;
 use kincal::recording::Recording;
-use kincal::simulate::inverse;
 use kincal::variation::{Directions, Part, Slot, Term, Varying};
 use kincal::{CalibratedMachine, Chain, Machine};
 use rayon::prelude::*;
@@ -127,7 +126,7 @@ fn corrected(model: &CalibratedMachine, path: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (path.iter().zip(directions(path)))
         .map(|(q, d)| {
             let wanted = nominal.w_from_t(q);
-            inverse(&chain(model, &d, q), machine, wanted.translation, wanted.rotation.column(2), q)
+            aimed(&chain(model, &d, q), machine, wanted.translation, wanted.rotation.column(2), q)
                 .expect("reached")
         })
         .collect()
