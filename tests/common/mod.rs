@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod channels;
+pub mod draws;
 pub mod paper;
 pub mod random;
 
