@@ -10,6 +10,7 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
+use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, Sweep};
 use crate::check::random_command;
@@ -17,7 +18,7 @@ use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{JointKind, Machine};
 
 /// What of the goal counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mode {
     /// The tip: three equations.
     Position,
@@ -100,7 +101,7 @@ pub struct Goal {
 
 /// How it ended.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// Every equation of the mode holds.
     Reached,
@@ -124,7 +125,7 @@ pub enum Outcome {
 
 /// What was found.
 #[non_exhaustive]
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     /// Commands, m or rad, machine order.
     pub commands: Vec<f64>,

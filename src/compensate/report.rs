@@ -1,6 +1,6 @@
 //! What compensation did, for people and machines.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::calibration::LeftOut;
 
@@ -9,7 +9,7 @@ pub const MOST_LISTED: usize = 50;
 
 /// A list that names the first [`MOST_LISTED`] of its entries and counts all.
 #[non_exhaustive]
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Listed<T> {
     /// How many there are.
     pub count: u64,
@@ -45,7 +45,7 @@ impl<T> Listed<T> {
 
 /// A figure, and the line at which it is reached.
 #[non_exhaustive]
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Worst {
     /// m or rad.
     pub value: f64,
@@ -63,7 +63,7 @@ impl Worst {
 
 /// The correction changes at once, because the direction of travel did.
 #[non_exhaustive]
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Reversal {
     /// Line of the block that starts with it.
     pub line: usize,
@@ -75,7 +75,7 @@ pub struct Reversal {
 
 /// The axes travel in a pattern of directions that no recording has shown.
 #[non_exhaustive]
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct UnseenPiece {
     /// Line of the block.
     pub line: usize,
@@ -85,7 +85,7 @@ pub struct UnseenPiece {
 
 /// An axis comes to a block's end from a place that is not known.
 #[non_exhaustive]
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct UnknownWay {
     /// Line of the block.
     pub line: usize,
@@ -97,7 +97,7 @@ pub struct UnknownWay {
 
 /// A joint that would leave its travel.
 #[non_exhaustive]
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct OutOfTravel {
     /// Line of the block.
     pub line: usize,
@@ -109,7 +109,7 @@ pub struct OutOfTravel {
 
 /// A pose at which the joints have lost a direction.
 #[non_exhaustive]
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SingularBlock {
     /// Line of the block.
     pub line: usize,
@@ -121,7 +121,7 @@ pub struct SingularBlock {
 
 /// A pose that the corrected machine does not reach.
 #[non_exhaustive]
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Unreached {
     /// Line of the block.
     pub line: usize,
@@ -133,7 +133,7 @@ pub struct Unreached {
 
 /// What [`compensate`](super::compensate) did. Lengths in m, angles in rad.
 #[non_exhaustive]
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the machine.
     pub machine: String,
@@ -190,10 +190,10 @@ pub struct Report {
     /// left there.
     pub never_programmed: Vec<String>,
     /// Effects of the calibration that a program says nothing of: they are not corrected.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<LeftOut>,
     /// Effects that change with time, and the state in which they are corrected.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub held: Vec<LeftOut>,
     /// What the calibration has not seen of the errors of tip and tool axis at the ends of these moves;
     /// `None` where that is not known.
@@ -203,7 +203,7 @@ pub struct Report {
 /// Errors of tip and tool axis that may be left because no recording has shown them. Root mean squares over
 /// the moves, one standard deviation.
 #[non_exhaustive]
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Unseen {
     /// Of the tip, m.
     pub tip_m: f64,
@@ -215,7 +215,7 @@ pub struct Unseen {
 
 /// One combination of deviations that no recording has shown.
 #[non_exhaustive]
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct UnseenPattern {
     /// Its largest components, in units of their tolerances: `c.vx`.
     pub mostly: Vec<String>,
