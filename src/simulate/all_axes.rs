@@ -11,7 +11,7 @@ pub(super) struct AllAxes(Inverse<'static>);
 
 impl AllAxes {
     pub fn new(machine: &Machine) -> Self {
-        let exact = InverseOptions::default().with_weak(0.0).with_within_travel(false);
+        let exact = InverseOptions::default().with_weak(1e-6).with_within_travel(false);
         AllAxes(Inverse::owning(machine.clone()).with_mode(Mode::PositionAndAxis).with_options(exact))
     }
 

@@ -68,7 +68,7 @@ pub fn aimed(
     axis_w: Vec3<f64>,
     start: &[f64],
 ) -> Option<Vec<f64>> {
-    let exact = InverseOptions::default().with_weak(0.0).with_within_travel(false);
+    let exact = InverseOptions::default().with_weak(1e-6).with_within_travel(false);
     let inverse = Inverse::new(machine).with_mode(Mode::PositionAndAxis).with_options(exact);
     let first = axis_w.across()[0];
     let columns = [first, axis_w.cross(first), axis_w];
