@@ -282,7 +282,7 @@ fn training(machine: &Machine) -> [(&'static str, [Vec<Vec<f64>>; 3]); 5] {
 /// Of the plans of `training` the first is the one after which the best estimator is expected to err least on these paths, which is known
 /// before anything is measured. That it holds the limits on all three ranges of tables was seen before it was chosen; others do not,
 /// docs/directions.md.
-fn pieces_and_one_model_are_near_the_best(tables: Range<u64>) {
+fn pieces_and_one_model_are_near_the_best(tables: Range<u64>) -> Elsewhere {
     let machine = common::machine("ac_table_tilting_paper");
     let [(name, trained), ..] = training(&machine);
     println!("trained on {name}, tables {tables:?}");
@@ -290,7 +290,8 @@ fn pieces_and_one_model_are_near_the_best(tables: Range<u64>) {
     assert!(told.median <= 1.0 && told.worst <= 1.1, "{} {}", told.median, told.worst);
     let [pieces, unified, bent] = told.to_best;
     assert!(pieces <= 1.15 && unified <= 1.15, "{:?}", told.to_best);
-    assert!(bent > 1.2, "room for error motions is what it takes: {bent}");
+    assert!(bent > pieces && bent > unified, "room for error motions helps: {:?}", told.to_best);
+    told
 }
 
 #[test]
@@ -301,10 +302,10 @@ fn on_paths_not_trained_on_pieces_are_no_worse_than_one_model_and_both_are_near_
 #[test]
 #[ignore = "long: sixty tables"]
 fn so_they_are_on_more_tables_of_three_ranges() {
-    [0, 1000, 2000]
-        .map(|first| first..first + SEEDS)
-        .into_iter()
-        .for_each(pieces_and_one_model_are_near_the_best);
+    for first in [0, 1000, 2000] {
+        let [.., bent] = pieces_and_one_model_are_near_the_best(first..first + SEEDS).to_best;
+        assert!(bent > 1.2, "room for error motions is what it takes: {bent}");
+    }
 }
 
 /// What is expected of the best estimator on the paths of [`paths_to_judge_on`], summed, m.

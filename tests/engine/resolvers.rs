@@ -102,7 +102,7 @@ fn resolvers_are_told(draws: u32) {
 
 #[test]
 fn the_delay_of_a_resolver_is_no_lost_motion_and_its_wave_has_its_order() {
-    resolvers_are_told(2);
+    resolvers_are_told(1);
 }
 
 /// `KINCAL_DRAWS` of them where somebody has the time.

@@ -269,11 +269,11 @@ fn what_is_right_holds_in_a_set_up_left_out_and_a_meaningless_cause_does_not() {
     }
 }
 
-#[test]
-fn any_other_function_of_where_a_joint_stands_is_unexplained_at_that_joint() {
+/// Bumps of random signs along a joint, drawn with each of these seeds.
+fn bumps_are_unexplained_at_their_joint(seeds: &[u64]) {
     let machine = common::machine("six_r_arm");
     let nominal = CalibratedMachine::nominal(machine.clone());
-    for seed in [3, 4, 5] {
+    for &seed in seeds {
         let mut random = Random::new(seed);
         let poses = poses(&machine, 300, &mut random);
         let heights: Vec<f64> = (0..21).map(|_| 2e-4 * random.between(-1.0, 1.0).signum()).collect();
@@ -293,4 +293,15 @@ fn any_other_function_of_where_a_joint_stands_is_unexplained_at_that_joint() {
         let without = told(0.0, &mut random);
         assert!(without.findings.is_empty() && without.unexplained.is_none(), "seed {seed}");
     }
+}
+
+#[test]
+fn any_other_function_of_where_a_joint_stands_is_unexplained_at_that_joint() {
+    bumps_are_unexplained_at_their_joint(&[3]);
+}
+
+#[test]
+#[ignore = "long: four diagnoses of an arm"]
+fn so_are_others_drawn_anew() {
+    bumps_are_unexplained_at_their_joint(&[4, 5]);
 }
