@@ -6,24 +6,24 @@
 
 mod along;
 mod approaches;
-mod bent;
 mod blocks;
 mod coarse;
-mod companions;
 mod contained;
 mod course;
 mod curves;
 mod detour;
 mod diagnosis;
+mod discrepancy;
 mod elsewhere;
 mod enter;
 mod evidence;
 mod finding;
 mod folds;
 mod held_out;
-mod late;
+mod lag;
 mod leftover;
 mod linear;
+mod marginal;
 mod model;
 mod noise;
 mod not_tried;
@@ -37,16 +37,16 @@ mod placebo;
 mod polish;
 mod reach;
 mod refine;
+mod relinearised;
 mod report;
 mod rounds;
 mod score;
 mod search;
 mod series;
 mod set_ups;
-mod shape;
+mod shared;
 mod shares;
 mod side_branches;
-mod space;
 mod spectrum;
 mod speeds;
 mod stretch;
@@ -62,12 +62,12 @@ inner! {
     use traces::{Along, Curve, CurvePoint, Trace, Traces};
 }
 pub use approaches::{SaidBy, StandsStill};
-pub use companions::Companion;
 pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
 pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};
 pub use not_tried::NotTried;
 pub use outliers::{Outliers, WithoutOutliers};
 pub use set_ups::{LeftOutRms, SetUpLeftOut};
+pub use shared::Companion;
 pub use side_branches::UnseenSideBranch;
 pub use stretch::Where;
 pub use unexplained::{Gathering, Unexplained};
@@ -117,8 +117,8 @@ pub fn diagnose(
     let Told { mut diagnosis, may_be_late } = case.told(&candidates.all)?;
     if let Some(joint) = may_be_late {
         progress("looking at it as at an axis that is late");
-        let other = case.told(&late::but_late(&candidates.all, joint))?.diagnosis;
-        if late::foretells_better(&other, &diagnosis) {
+        let other = case.told(&lag::but_late(&candidates.all, joint))?.diagnosis;
+        if lag::foretells_better(&other, &diagnosis) {
             diagnosis = other;
         }
     }

@@ -10,6 +10,7 @@ mod fit;
 mod information;
 mod judge;
 mod loss;
+mod noise;
 mod normal;
 mod optimum;
 mod places;
@@ -53,7 +54,8 @@ use crate::variation::{Directions, MOST_AXES, Variation, Varying};
 use crate::wording;
 use evidence::Sizes;
 use information::Information as Info;
-use normal::{Noise, Normal, Sums, Tally};
+use noise::{Noise, with_stated};
+use normal::{Normal, Sums, Tally};
 use solve::{Problem, Solution};
 use thin::Thin;
 use unknowns::Block;
@@ -555,23 +557,6 @@ fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Nois
                 n => (sums.inlier_squares / (n as f64 * left)).sqrt().max(thin::FINEST),
             };
             sum.residuals.zip(*present).map(|(sums, present)| scale(&sums, present))
-        })
-        .collect()
-}
-
-/// A stated `sigma` counts unless the residuals are larger: what no model explains is no better known for being stated.
-fn with_stated(sources: &Sources, seen: &[Noise]) -> Vec<Noise> {
-    sources
-        .all
-        .iter()
-        .zip(seen)
-        .map(|(source, seen)| match source.recording.header().sigma {
-            None => *seen,
-            Some(sigma) => {
-                let mut noise = *seen;
-                noise[sigma.quantity] = sigma.value.max(seen[sigma.quantity]);
-                noise
-            }
         })
         .collect()
 }

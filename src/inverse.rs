@@ -5,9 +5,12 @@
 //! the joints hardly move the tool is held near the start instead of being chased, so that a correction stays
 //! small at a singular pose, and is told.
 
+use std::borrow::Cow;
+
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
+use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, Sweep};
 use crate::check::random_command;
@@ -15,7 +18,7 @@ use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{JointKind, Machine};
 
 /// What of the goal counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Mode {
     /// The tip: three equations.
     Position,
@@ -98,7 +101,7 @@ pub struct Goal {
 
 /// How it ended.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Outcome {
     /// Every equation of the mode holds.
     Reached,
@@ -122,7 +125,7 @@ pub enum Outcome {
 
 /// What was found.
 #[non_exhaustive]
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Solution {
     /// Commands, m or rad, machine order.
     pub commands: Vec<f64>,
@@ -139,7 +142,7 @@ pub struct Solution {
 /// The inverse of the chains of one machine.
 #[derive(Clone, Debug)]
 pub struct Inverse<'a> {
-    machine: &'a Machine,
+    machine: Cow<'a, Machine>,
     mode: Mode,
     options: InverseOptions,
     /// Equations of orientation that the machine has joints for on general poses.
@@ -216,6 +219,15 @@ impl<'a> Inverse<'a> {
     /// In the mode that the machine has joints for: the full pose with six independent freedoms, else
     /// position and tool axis where joints turn the tool axis, else position.
     pub fn new(machine: &'a Machine) -> Self {
+        Inverse::of(Cow::Borrowed(machine))
+    }
+
+    /// The same with a machine of its own.
+    pub fn owning(machine: Machine) -> Inverse<'static> {
+        Inverse::of(Cow::Owned(machine))
+    }
+
+    fn of(machine: Cow<'a, Machine>) -> Self {
         let mut inverse = Inverse {
             machine,
             mode: Mode::Pose,
@@ -260,7 +272,7 @@ impl<'a> Inverse<'a> {
     /// Ranks over general poses: of everything, of orientation, of position, and whether linear joints alone
     /// give position.
     fn ranks(&self) -> (usize, usize, usize, bool) {
-        let chain = Chain::nominal(self.machine);
+        let chain = Chain::nominal(&self.machine);
         let mut rng = StdRng::seed_from_u64(5);
         let count = self.machine.commands().len();
         let free = vec![true; count];
@@ -272,7 +284,7 @@ impl<'a> Inverse<'a> {
         };
         let mut best = (0, 0, 0, false);
         for _ in 0..8 {
-            let q: Vec<f64> = (0..count).map(|c| random_command(self.machine, c, &mut rng)).collect();
+            let q: Vec<f64> = (0..count).map(|c| random_command(&self.machine, c, &mut rng)).collect();
             let look = self.look(&chain, &goal, &q);
             let (turns, shifts) = (self.turn_rows(&look, &free), self.shift_rows(&look, &free));
             let mut all = DMatrix::zeros(turns.nrows() + 3, count);
@@ -337,7 +349,7 @@ impl<'a> Inverse<'a> {
         let mut matrix = DMatrix::zeros(wrenches.len(), free.len());
         let mut row = vec![0.0; free.len()];
         for (k, wrench) in wrenches.iter().enumerate() {
-            look.sweep.command_row(self.machine, *wrench, &mut row);
+            look.sweep.command_row(&self.machine, *wrench, &mut row);
             for c in (0..free.len()).filter(|c| free[*c]) {
                 matrix[(k, c)] = row[c];
             }

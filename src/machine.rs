@@ -123,7 +123,7 @@ impl Machine {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Input`](crate::error::Error::Input) with a [`MachineFault`]; its place is the path of the value at fault, such as
+    /// [`Error::Input`] with a [`MachineFault`]; its place is the path of the value at fault, such as
     /// `tool[2].joint.axis`.
     pub fn new(
         name: impl Into<String>,

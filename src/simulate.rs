@@ -10,14 +10,13 @@
 //!
 //! A [`Session`] puts them together; `docs/simulate.md` teaches `kincal simulate`.
 
+mod all_axes;
 mod commands;
 mod cone;
 mod course;
 mod faults;
 mod follow;
 mod instrument;
-mod inverse;
-mod paper;
 mod part_program;
 mod plant;
 mod poses;
@@ -47,8 +46,6 @@ inner! {
     use course::{At, Course, Sample, Samples};
     use faults::Width;
     use instrument::noise_of;
-    use inverse::inverse;
-    use paper::{paper_path, paper_plant};
     use part_program::{Drive, PartProgram};
     use plant::State;
     use poses::RandomPoses;

@@ -5,8 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::marginal::{Marginal, gram};
 use super::search::Search;
-use super::space::{Space, gram};
 use crate::machine::Machine;
 use crate::variation::Slot;
 
@@ -28,13 +28,13 @@ pub(super) struct Along {
 }
 
 /// The joint of which that stands out most.
-pub(super) fn along_travel(search: &Search, machine: &Machine, space: &Space) -> Option<Along> {
-    let left = space.apply(&search.rows.residual);
+pub(super) fn along_travel(search: &Search, machine: &Machine, marginal: &Marginal) -> Option<Along> {
+    let left = marginal.apply(&search.rows.residual);
     let all = machine.joints().filter_map(|(j, joint)| {
         let columns = hats(search, j, Slot::Before(j), joint.twist())?;
         let toward = columns.tr_mul(&left);
         let beside = gram(&columns, &columns) - {
-            let along = space.along(&columns.as_view());
+            let along = marginal.along(&columns.as_view());
             along.tr_mul(&along)
         };
         let eigen = beside.symmetric_eigen();

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::held_out::Model;
-use super::search::{Active, Search};
+use super::search::{ModelTerm, Search};
 use crate::feature::{Feature, Samples};
 use crate::identify::Approach;
 use crate::machine::Machine;
@@ -38,7 +38,7 @@ pub struct SaidBy {
 
 /// Sides of approach of all joints that stand still, and have an effect that depends on it. What was found of how the effect was before
 /// anybody looked is compared with what either side would be; the middle is no side.
-pub(super) fn approaches(search: &Search, kept: &[Active], machine: &Machine) -> Vec<StandsStill> {
+pub(super) fn approaches(search: &Search, kept: &[ModelTerm], machine: &Machine) -> Vec<StandsStill> {
     let linear = search.rows.linear;
     let model = Model::new(search, kept);
     // By recording and dyad: the product of what was found with what rising would be, and its square.
@@ -96,7 +96,7 @@ fn said_by(machine: &Machine, dyad: usize, direction: i8) -> Option<SaidBy> {
 }
 
 /// What effect `i` does to every row over these samples, m or rad.
-fn effects_of(search: &Search, kept: &[Active], model: &Model, i: usize, samples: &[Samples]) -> Vec<f64> {
+fn effects_of(search: &Search, kept: &[ModelTerm], model: &Model, i: usize, samples: &[Samples]) -> Vec<f64> {
     let rows = search.rows;
     let candidate = &search.candidates[kept[i].candidate];
     let features = candidate.over(samples, &kept[i].score.parameters);

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::coarse::{AtPoint, Features, Level};
+use super::marginal::Marginal;
 use super::score::{BATCH, Best, Equations, Field, Rows, best, is_of_number, judge, key, lengths, unit};
-use super::space::Space;
 use crate::effects::Candidate;
 use crate::lie::Twist;
 use crate::variation::Slot;
@@ -24,14 +24,14 @@ impl Rows<'_> {
         grid: &[Vec<f64>],
         field: &Field,
         (number, kept): (usize, &Features),
-        heat: f64,
+        overdispersion: f64,
         points: &[usize],
         table: &mut [Option<Best>],
     ) {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
         let usual = self.usual_sizes(candidate, grid);
         let level = &self.coarse.levels()[number];
-        let (space, left) = self.on_level(field, number);
+        let (marginal, left) = self.on_level(field, number);
         let answers: Vec<Vec<Arc<Vec<f64>>>> = (candidate.coefficients.iter())
             .map(|c| c.parts.iter().map(|p| self.coarse_answer(number, p.slot, p.direction)).collect())
             .collect();
@@ -45,16 +45,16 @@ impl Rows<'_> {
             }
             let count = on_blocks(candidate, level, &answers, &features, &mut columns);
             let own = columns.rows(0, count);
-            let (mut along, mut g, mut from) = (DMatrix::zeros(space.width(), k), DVector::zeros(k), 0);
+            let (mut along, mut g, mut from) = (DMatrix::zeros(marginal.width(), k), DVector::zeros(k), 0);
             for run in features.runs {
                 let (first, rows) = level.rows(*run);
                 let part = own.rows(from, rows);
-                space.add_along(first, &part, &mut along);
+                marginal.add_along(first, &part, &mut along);
                 g += part.tr_mul(&left.rows(first, rows));
                 from += rows;
             }
             let equations = Equations::of(&own, &along.as_view(), g);
-            table[*i] = Some(best(candidate, &grid[*i], &lengths, &equations, heat, usual));
+            table[*i] = Some(best(candidate, &grid[*i], &lengths, &equations, overdispersion, usual));
         }
         for batch in everywhere.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
@@ -68,18 +68,18 @@ impl Rows<'_> {
                     from += rows;
                 }
             }
-            judge(&joined.columns(0, k * batch.len()), space, left, batch, &mut |i, equations| {
-                table[i] = Some(best(candidate, &grid[i], &lengths, equations, heat, usual));
+            judge(&joined.columns(0, k * batch.len()), marginal, left, batch, &mut |i, equations| {
+                table[i] = Some(best(candidate, &grid[i], &lengths, equations, overdispersion, usual));
             });
         }
     }
 
-    /// Space and residuals on the blocks of a level.
-    pub(super) fn on_level<'f>(&self, field: &'f Field, number: usize) -> &'f (Space, DVector<f64>) {
+    /// Marginal and residuals on the blocks of a level.
+    pub(super) fn on_level<'f>(&self, field: &'f Field, number: usize) -> &'f (Marginal, DVector<f64>) {
         let level = &self.coarse.levels()[number];
         field.coarse[number].get_or_init(|| {
-            let space = field.space.reduced(number, |panel| level.reduce_panel(panel));
-            (space, DVector::from_vec(level.reduce(field.left.as_slice())))
+            let marginal = field.marginal.reduced(number, |panel| level.reduce_panel(panel));
+            (marginal, DVector::from_vec(level.reduce(field.left.as_slice())))
         })
     }
 

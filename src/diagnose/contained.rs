@@ -3,9 +3,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::search::{Active, Rival, Search};
-use super::shape;
-use super::space::{Space, gram};
+use super::discrepancy;
+use super::marginal::{Marginal, gram};
+use super::search::{Hypothesis, ModelTerm, Search};
 use crate::effects::Candidate;
 
 /// What a wider name adds is next to nothing below this part of what it does, root mean square in m and rad; and below this part where the
@@ -28,56 +28,62 @@ const RARER: f64 = 3.0;
 
 /// Whether effect `i` is no more than what its name says more than, and no other name for that is at hand: straight lines are no
 /// positioning errors, even where nobody has told of scales.
-pub(super) fn says_no_more(search: &Search, active: &[Active], i: usize) -> bool {
-    let effect = &active[i];
+pub(super) fn says_no_more(search: &Search, in_model: &[ModelTerm], i: usize) -> bool {
+    let effect = &in_model[i];
     let candidate = &search.candidates[effect.candidate];
     if candidate.more_than.is_empty() {
         return false;
     }
-    let field = search.rows.field(search.ground(active, Some(i)).with(&effect.state));
+    let field = search.rows.field(search.ground(in_model, Some(i)).with(&effect.state));
     let gain = |candidate: &Candidate, parameters: &[f64]| {
-        let score = search.rows.score_at(candidate, parameters, &field, search.heat);
+        let score = search.rows.score_at(candidate, parameters, &field, search.overdispersion);
         score.map_or(0.0, |score| score.gain)
     };
     let own = gain(candidate, &effect.score.parameters);
-    let enough = own - MORE * own - CHANCE * search.heat;
+    let enough = own - MORE * own - CHANCE * search.overdispersion;
     let is_empty =
         |candidate: &Candidate, at: &[f64]| candidate.more_than.iter().any(|less| gain(less, at) >= enough);
-    let rivals = search.rivals_of(active, i);
-    let weight = rivals.iter().find(|r| r.candidate == effect.candidate).map_or(0.0, |r| r.weight);
+    let hypotheses = search.rivals_of(in_model, i);
+    let weight = hypotheses.iter().find(|r| r.candidate == effect.candidate).map_or(0.0, |r| r.weight);
     // As much as it takes away less, and no rarer otherwise.
-    let is_name = |rival: &Rival| {
-        let other = &search.candidates[rival.candidate];
-        let takes = gain(other, &rival.score.parameters);
+    let is_name = |hypothesis: &Hypothesis| {
+        let other = &search.candidates[hypothesis.candidate];
+        let takes = gain(other, &hypothesis.score.parameters);
         // Of a form of it, what it is told as is a name too.
         (other.told_as != candidate.told_as
             || other.effect != candidate.effect && other.effect == other.told_as)
             && other.place == candidate.place
             && takes >= enough
-            && rival.weight + (own - takes) / search.heat + RARER > weight
-            && !is_empty(other, &rival.score.parameters)
+            && hypothesis.weight + (own - takes) / search.overdispersion + RARER > weight
+            && !is_empty(other, &hypothesis.score.parameters)
     };
-    is_empty(candidate, &effect.score.parameters) && !rivals.iter().any(is_name)
+    is_empty(candidate, &effect.score.parameters) && !hypotheses.iter().any(is_name)
 }
 
 /// Puts simpler names above the best one where that contains them and hardly departs from them. `close`: those that come into question.
-pub(super) fn prefer_simpler(search: &Search, rivals: &mut [Rival], close: usize, space: &Space) {
-    let Some(best) = rivals.first().cloned() else { return };
-    let place = |r: &Rival| search.candidates[r.candidate].place;
-    let is_simpler = |r: &Rival| {
+pub(super) fn prefer_simpler(
+    search: &Search,
+    hypotheses: &mut [Hypothesis],
+    close: usize,
+    marginal: &Marginal,
+) {
+    let Some(best) = hypotheses.first().cloned() else { return };
+    let place = |r: &Hypothesis| search.candidates[r.candidate].place;
+    let is_simpler = |r: &Hypothesis| {
         place(r) == place(&best)
             && r.score.coefficients < best.score.coefficients
             && r.score.gain >= NEARLY_ALL * best.score.gain
     };
-    let simpler: Vec<usize> = (1..close.min(rivals.len())).filter(|i| is_simpler(&rivals[*i])).collect();
+    let simpler: Vec<usize> =
+        (1..close.min(hypotheses.len())).filter(|i| is_simpler(&hypotheses[*i])).collect();
     if simpler.is_empty() {
         return;
     }
-    let raw = |r: &Rival| -> Option<DMatrix<f64>> {
+    let raw = |r: &Hypothesis| -> Option<DMatrix<f64>> {
         let all = search.rows.raw(&search.candidates[r.candidate], &r.score.parameters)?;
         Some(all.columns(0, r.score.coefficients).into_owned())
     };
-    let Some((wide, effect)) = raw(&best).zip(search.enter(&best, space)) else { return };
+    let Some((wide, effect)) = raw(&best).zip(search.enter(&best, marginal)) else { return };
     let does = DMatrix::from_columns(&[&wide * &effect.solution]);
     // Where zero is, is a matter of constant geometry.
     let constant: Vec<DVector<f64>> = (search.candidates[best.candidate].coefficients.iter())
@@ -86,18 +92,18 @@ pub(super) fn prefer_simpler(search: &Search, rivals: &mut [Rival], close: usize
         .collect();
     let constant = DMatrix::from_columns(&constant);
     let (does, wide) = (beside(&does, &constant), beside(&wide, &constant));
-    let curve = Some(&search.candidates[best.candidate]).filter(|candidate| shape::is_curve(candidate));
+    let curve = Some(&search.candidates[best.candidate]).filter(|candidate| discrepancy::is_curve(candidate));
     let less: Vec<DMatrix<f64>> = (curve.iter().flat_map(|candidate| &candidate.more_than))
         .filter_map(|less| search.rows.raw(less, &best.score.parameters))
         .map(|less| beside(&less, &constant))
         .collect();
     for i in simpler {
-        let Some(own) = raw(&rivals[i]) else { continue };
+        let Some(own) = raw(&hypotheses[i]) else { continue };
         let own = beside(&own, &constant);
         let is_less = less.iter().any(|less| left(&own, less) < CONTAINED && left(less, &own) < CONTAINED);
         let added = if is_less { LITTLE } else { NOTHING };
         if left(&own, &wide) < CONTAINED && left(&does, &own) < added {
-            rivals[i].weight = rivals[i].weight.max(best.weight + LIKELIER);
+            hypotheses[i].weight = hypotheses[i].weight.max(best.weight + LIKELIER);
         }
     }
 }

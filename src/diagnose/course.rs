@@ -2,8 +2,8 @@
 //! `docs/diagnosis-method.md` (69).
 
 use super::curves::{column, product};
+use super::discrepancy::{EARLY, UNKNOWN};
 use super::series::{Motion, Series, over_range, series, smooth, unit};
-use super::shape::{EARLY, UNKNOWN};
 use crate::effects::Place;
 use crate::feature::{JointSamples, Samples};
 use crate::lie::Twist;

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::approaches::StandsStill;
-use super::companions::Companion;
 use super::finding::Finding;
 use super::not_tried::NotTried;
 use super::outliers::{Outliers, WithoutOutliers};
 use super::search::Search;
 use super::set_ups::SetUpLeftOut;
+use super::shared::Companion;
 use super::side_branches::UnseenSideBranch;
 use super::traces::Traces;
 use super::unexplained::Unexplained;

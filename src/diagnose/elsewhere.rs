@@ -1,6 +1,6 @@
 //! All that is told as one effect of a joint, at another joint together, `docs/diagnosis-method.md` (80).
 
-use super::search::{Active, Search};
+use super::search::{ModelTerm, Search};
 use crate::effects::Place;
 
 impl Search<'_> {
@@ -8,9 +8,9 @@ impl Search<'_> {
     ///
     /// A joint that gives way about its axis and across it is two effects, and while one of them stays the other has no reason to go. It is
     /// tried where positions are settled: weight is what several effects of one name are told of.
-    pub fn moved_together(&self, active: Vec<Active>) -> Vec<Active> {
-        let groups: Vec<(&str, Place)> = active.iter().map(|effect| self.told(effect.candidate)).collect();
-        let mut best = active;
+    pub fn moved_together(&self, in_model: Vec<ModelTerm>) -> Vec<ModelTerm> {
+        let groups: Vec<(&str, Place)> = in_model.iter().map(|effect| self.told(effect.candidate)).collect();
+        let mut best = in_model;
         for (i, group) in groups.iter().enumerate() {
             let (is_known, is_several) = (groups[..i].contains(group), groups[i + 1..].contains(group));
             if self.in_motion || is_known || !is_several {
@@ -42,9 +42,9 @@ impl Search<'_> {
     }
 
     /// A group of effects at another place; `None` where one of them cannot sit there, or does.
-    fn moved_to(&self, to: Place, active: &[Active], group: (&str, Place)) -> Option<Vec<Active>> {
-        let (here, mut moved): (Vec<Active>, Vec<Active>) =
-            active.iter().cloned().partition(|effect| self.told(effect.candidate) == group);
+    fn moved_to(&self, to: Place, in_model: &[ModelTerm], group: (&str, Place)) -> Option<Vec<ModelTerm>> {
+        let (here, mut moved): (Vec<ModelTerm>, Vec<ModelTerm>) =
+            in_model.iter().cloned().partition(|effect| self.told(effect.candidate) == group);
         for effect in here {
             let name = &self.candidates[effect.candidate].effect;
             let there = self.candidates.iter().position(|c| c.effect == *name && c.place == to)?;
@@ -52,11 +52,11 @@ impl Search<'_> {
                 return None;
             }
             let ground = self.ground(&moved, None);
-            let rival = self.compare(ground.clone(), Some(&[there])).into_iter().next()?;
-            // Each stays a rival of the other.
+            let hypothesis = self.compare(ground.clone(), Some(&[there])).into_iter().next()?;
+            // Each stays a hypothesis of the other.
             let mut near = effect.near.clone();
             near.extend([there, effect.candidate].into_iter().filter(|c| !effect.near.contains(c)));
-            moved.push(Active { near, ..self.settle(&rival, &ground)? });
+            moved.push(ModelTerm { near, ..self.settle(&hypothesis, &ground)? });
         }
         Some(moved)
     }

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::discrepancy;
 use super::evidence::likely_part;
+use super::marginal::Marginal;
 use super::refine::refine;
 use super::score::Score;
-use super::search::{Active, Rival, Search};
-use super::shape;
-use super::space::Space;
+use super::search::{Hypothesis, ModelTerm, Search};
 use crate::effects::Candidate;
 use crate::feature::Feature;
 
@@ -17,64 +17,74 @@ use crate::feature::Feature;
 const MOVED: f64 = 3.0;
 
 impl Search<'_> {
-    /// Takes a rival in, at its best point beside what nobody knows of how it was before: a hysteresis is found with another length of
+    /// Takes a hypothesis in, at its best point beside what nobody knows of how it was before: a hysteresis is found with another length of
     /// take-up where the way before the first reversal is wrong.
-    pub(super) fn settle(&self, rival: &Rival, space: &Arc<Space>) -> Option<Active> {
-        let entered = self.enter(rival, space)?;
-        let candidate = &self.candidates[rival.candidate];
+    pub(super) fn settle(&self, hypothesis: &Hypothesis, marginal: &Arc<Marginal>) -> Option<ModelTerm> {
+        let entered = self.enter(hypothesis, marginal)?;
+        let candidate = &self.candidates[hypothesis.candidate];
         if entered.state.ncols() == 0 || candidate.parameters.iter().all(|p| p.whole) {
             return Some(entered);
         }
-        let beside = self.rows.field(space.with(&entered.state));
-        let score = self.rows.score_at(candidate, &rival.score.parameters, &beside, self.heat)?;
-        let start = Rival::new(rival.candidate, score.evidence, score);
-        let moved = refine(self.rows, candidate, &start, &beside, self.heat);
+        let beside = self.rows.field(marginal.with(&entered.state));
+        let score =
+            self.rows.score_at(candidate, &hypothesis.score.parameters, &beside, self.overdispersion)?;
+        let start = Hypothesis::new(hypothesis.candidate, score.evidence, score);
+        let moved = refine(self.rows, candidate, &start, &beside, self.overdispersion);
         if moved.score.at_best < start.score.at_best + MOVED {
             return Some(entered);
         }
         let score = self.rows.score_at(
             candidate,
             &moved.score.parameters,
-            &self.rows.field(space.clone()),
-            self.heat,
+            &self.rows.field(marginal.clone()),
+            self.overdispersion,
         )?;
         self.enter(
-            &Rival { score: Score { evidence: rival.score.evidence, ..score }, ..rival.clone() },
-            space,
+            &Hypothesis {
+                score: Score { evidence: hypothesis.score.evidence, ..score },
+                ..hypothesis.clone()
+            },
+            marginal,
         )
     }
 
-    /// Takes a rival in, at its best point.
-    pub fn enter(&self, rival: &Rival, space: &Space) -> Option<Active> {
-        let mut effect = self.enter_bare(rival, space)?;
-        let candidate = &self.candidates[rival.candidate];
+    /// Takes a hypothesis in, at its best point.
+    pub fn enter(&self, hypothesis: &Hypothesis, marginal: &Marginal) -> Option<ModelTerm> {
+        let mut effect = self.enter_bare(hypothesis, marginal)?;
+        let candidate = &self.candidates[hypothesis.candidate];
         if self.in_motion && candidate.features.iter().any(Feature::needs_history) {
-            let each = shape::each_answer(self.rows, candidate, &effect);
-            if each.len() > shape::MOST_DIRECTIONS {
+            let each = discrepancy::each_answer(self.rows, candidate, &effect);
+            if each.len() > discrepancy::MOST_DIRECTIONS {
                 // Their mixture is found where each of them may have been anything beforehand.
-                let anything = space.with(&shape::states(self.rows, candidate, &effect, each).white);
+                let anything = marginal
+                    .with(&discrepancy::initial_conditions(self.rows, candidate, &effect, each).white);
                 let (gram, toward) = self.normal(&effect.columns, &anything);
                 effect.solution = solved(gram, &toward)?;
             }
         }
         effect.state = self.state_of(&effect);
-        effect.shape = shape::columns(self.rows, candidate, &effect);
+        effect.shape = discrepancy::columns(self.rows, candidate, &effect);
         Some(effect)
     }
 
     /// The same without states and shape.
-    pub fn enter_bare(&self, rival: &Rival, space: &Space) -> Option<Active> {
-        self.enter_as(&self.candidates[rival.candidate], rival, space)
+    pub fn enter_bare(&self, hypothesis: &Hypothesis, marginal: &Marginal) -> Option<ModelTerm> {
+        self.enter_as(&self.candidates[hypothesis.candidate], hypothesis, marginal)
     }
 
-    /// The same as another candidate than the rival's own.
-    pub fn enter_as(&self, candidate: &Candidate, rival: &Rival, space: &Space) -> Option<Active> {
-        let mut score = rival.score.clone();
+    /// The same as another candidate than the hypothesis's own.
+    pub fn enter_as(
+        &self,
+        candidate: &Candidate,
+        hypothesis: &Hypothesis,
+        marginal: &Marginal,
+    ) -> Option<ModelTerm> {
+        let mut score = hypothesis.score.clone();
         let columns = self.rows.of(candidate, &score.parameters)?;
         let mut columns = columns.columns(0, score.coefficients) * score.room;
-        let (mut gram, mut toward) = self.normal(&columns, space);
+        let (mut gram, mut toward) = self.normal(&columns, marginal);
         if score.coefficients > 1 {
-            let part = likely_part(&gram, &toward, self.heat);
+            let part = likely_part(&gram, &toward, self.overdispersion);
             score.room *= part;
             columns *= part;
             gram *= part * part;
@@ -83,8 +93,8 @@ impl Search<'_> {
         let solution = solved(gram, &toward)?;
         let none = DMatrix::zeros(columns.nrows(), 0);
         let (state, shape) = (none.clone(), none);
-        Some(Active {
-            candidate: rival.candidate,
+        Some(ModelTerm {
+            candidate: hypothesis.candidate,
             score,
             columns,
             solution,
@@ -96,23 +106,23 @@ impl Search<'_> {
     }
 
     /// Columns of what an effect was before anybody looked.
-    pub fn state_of(&self, effect: &Active) -> DMatrix<f64> {
+    pub fn state_of(&self, effect: &ModelTerm) -> DMatrix<f64> {
         self.states_of(effect)
             .map_or_else(|| DMatrix::zeros(effect.columns.nrows(), 0), |states| states.white)
     }
 
     /// The same, with what they are made of; `None` among settled positions, where every side of approach is known.
-    pub fn states_of(&self, effect: &Active) -> Option<shape::Columns> {
+    pub fn states_of(&self, effect: &ModelTerm) -> Option<discrepancy::Columns> {
         let candidate = &self.candidates[effect.candidate];
-        let answers = || shape::answers(self.rows, candidate, effect);
-        self.in_motion.then(|| shape::states(self.rows, candidate, effect, answers()))
+        let answers = || discrepancy::answers(self.rows, candidate, effect);
+        self.in_motion.then(|| discrepancy::initial_conditions(self.rows, candidate, effect, answers()))
     }
 
-    /// Gram matrix of columns beside a space, and what leads from them to the residuals.
-    pub(super) fn normal(&self, columns: &DMatrix<f64>, space: &Space) -> (DMatrix<f64>, DVector<f64>) {
-        let along = space.along(&columns.as_view());
+    /// Gram matrix of columns beside a marginal, and what leads from them to the residuals.
+    pub(super) fn normal(&self, columns: &DMatrix<f64>, marginal: &Marginal) -> (DMatrix<f64>, DVector<f64>) {
+        let along = marginal.along(&columns.as_view());
         let gram = columns.tr_mul(columns) - along.tr_mul(&along);
-        (gram, columns.tr_mul(&space.apply(&self.rows.residual)))
+        (gram, columns.tr_mul(&marginal.apply(&self.rows.residual)))
     }
 }
 

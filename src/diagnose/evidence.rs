@@ -38,20 +38,20 @@ pub(super) fn evidence(
     gram: &DMatrix<f64>,
     g: &DVector<f64>,
     length: usize,
-    heat: f64,
+    overdispersion: f64,
     usual: usize,
 ) -> Worth {
     let (gram, g) = (gram.view((0, 0), (length, length)), g.rows(0, length).into_owned());
     // Logarithm, gain, root mean square of the coefficients over the size.
     let with = |size: f64| {
-        let s2 = size * size / heat;
+        let s2 = size * size / overdispersion;
         let mut inner = gram * s2;
         (0..length).for_each(|i| inner[(i, i)] += 1.0);
         let cholesky = Cholesky::new(inner)?;
         let solved = cholesky.solve(&g) * s2;
         let gain = 0.5 * g.dot(&solved);
         let log_det: f64 = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        Some((gain / heat - log_det, gain, solved.norm() / (length as f64).sqrt() / size))
+        Some((gain / overdispersion - log_det, gain, solved.norm() / (length as f64).sqrt() / size))
     };
     let mut worth = Worth { evidence: 0.0, gain: 0.0, size: 1.0 };
     let mut held = false;
@@ -89,14 +89,14 @@ const ROOM: f64 = 2.0;
 
 /// Which part of the size that several coefficients may have is likely, as all of them together show it: what the readings hardly see
 /// of an effect is then no larger than what they see. `gram`, `g`: of columns times that size.
-pub(super) fn likely_part(gram: &DMatrix<f64>, g: &DVector<f64>, heat: f64) -> f64 {
+pub(super) fn likely_part(gram: &DMatrix<f64>, g: &DVector<f64>, overdispersion: f64) -> f64 {
     let log = |part: f64| {
-        let s2 = part * part / heat;
+        let s2 = part * part / overdispersion;
         let mut inner = gram * s2;
         (0..g.len()).for_each(|i| inner[(i, i)] += 1.0);
         let Some(cholesky) = Cholesky::new(inner) else { return f64::NEG_INFINITY };
         let determinant = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-        0.5 * s2 / heat * g.dot(&cholesky.solve(g)) - determinant
+        0.5 * s2 / overdispersion * g.dot(&cholesky.solve(g)) - determinant
     };
     let parts = (0..PARTS).map(|k| 0.5f64.powi(k as i32));
     let best = parts.max_by(|a, b| log(*a).total_cmp(&log(*b))).unwrap_or(1.0);

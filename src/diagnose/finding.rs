@@ -22,7 +22,7 @@ pub struct Finding {
     pub explanation: String,
     /// Its sizes.
     pub coefficients: Vec<Size>,
-    /// Probability that name and place are right, or are those of a rival that the recordings cannot tell from it.
+    /// Probability that name and place are right, or are those of a hypothesis that the recordings cannot tell from it.
     pub probability: f64,
     /// Half of it is the logarithm of the evidence for it.
     pub delta_bic: f64,

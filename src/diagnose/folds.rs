@@ -4,8 +4,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
 use super::finding::HeldOutPair;
-use super::search::{Active, Search, all_but};
-use super::space::gram;
+use super::marginal::gram;
+use super::search::{ModelTerm, Search, all_but};
 use crate::units::{ByQuantity, Quantity};
 
 /// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
@@ -13,7 +13,7 @@ const FOLDS: usize = 5;
 
 /// Fits coefficients (geometry and effects, on the linearised model) with each fold left out in turn, and puts what is left there
 /// into the diagnosis. Nonlinear parameters and the choice of effects stay as all samples gave them.
-pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) {
+pub(super) fn fill(search: &Search, told: &[ModelTerm], diagnosis: &mut Diagnosis) {
     let Some(folds) = Folds::new(search, told) else { return };
     let with = |takes: &dyn Fn(usize) -> bool| folds.left_out(search, takes);
     let (geometric, last) = (with(&|_| false), with(&|_| true));
@@ -35,8 +35,8 @@ pub(super) fn fill(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) 
 
 /// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
 /// `Σ_f (e_f - r_f)·r_f - p`, (67), and the standard deviation of that by chance. `None` where there are too few rows.
-pub(super) fn surprise(search: &Search, active: &[Active]) -> Option<(f64, f64)> {
-    let normal = Normal::new(search, active)?;
+pub(super) fn surprise(search: &Search, in_model: &[ModelTerm]) -> Option<(f64, f64)> {
+    let normal = Normal::new(search, in_model)?;
     let (gram, b) = normal.without(None);
     let all = Cholesky::new(gram.clone())?;
     let x = all.solve(&b);
@@ -53,36 +53,36 @@ pub(super) fn surprise(search: &Search, active: &[Active]) -> Option<(f64, f64)>
 }
 
 /// The effect without which stretches that are left out are foretold best, where that is better than with all, (68): a patch.
-pub(super) fn harmful(search: &Search, active: &[Active]) -> Option<usize> {
-    let without = foretold_without(search, active)?;
+pub(super) fn harmful(search: &Search, in_model: &[ModelTerm]) -> Option<usize> {
+    let without = foretold_without(search, in_model)?;
     (0..without.len()).filter(|i| without[*i] > 0.0).max_by(|a, b| without[*a].total_cmp(&without[*b]))
 }
 
 /// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68); none where the others
 /// would have to take it for a shape that right names do not have.
-fn foretold_without(search: &Search, active: &[Active]) -> Option<Vec<f64>> {
-    let normal = Normal::new(search, active)?;
+fn foretold_without(search: &Search, in_model: &[ModelTerm]) -> Option<Vec<f64>> {
+    let normal = Normal::new(search, in_model)?;
     let all = normal.foretold(&|_| true)?;
     let bends = |i: usize| {
-        let others = all_but(active, Some(i));
+        let others = all_but(in_model, Some(i));
         !others.is_empty() && search.shares(&others).is_misshapen(others.len())
     };
     let without = |i: usize| {
         let better = normal.foretold(&|other| other != i).map(|without| without - all);
         better.filter(|better| *better <= 0.0 || !bends(i)).unwrap_or(f64::NEG_INFINITY)
     };
-    Some((0..active.len()).map(without).collect())
+    Some((0..in_model.len()).map(without).collect())
 }
 
 /// Whether stretches that are left out are foretold better by these effects than by others, (68).
-pub(super) fn foretell_better(search: &Search, these: &[Active], others: &[Active]) -> bool {
-    let foretold = |active: &[Active]| Normal::new(search, active)?.foretold(&|_| true);
+pub(super) fn foretell_better(search: &Search, these: &[ModelTerm], others: &[ModelTerm]) -> bool {
+    let foretold = |in_model: &[ModelTerm]| Normal::new(search, in_model)?.foretold(&|_| true);
     foretold(these).zip(foretold(others)).is_some_and(|(these, others)| these > others)
 }
 
 /// By how much better they are foretold by geometry alone, as a logarithm.
-fn foretold_without_all(search: &Search, active: &[Active]) -> Option<f64> {
-    let normal = Normal::new(search, active)?;
+fn foretold_without_all(search: &Search, in_model: &[ModelTerm]) -> Option<f64> {
+    let normal = Normal::new(search, in_model)?;
     Some(normal.foretold(&|_| false)? - normal.foretold(&|_| true)?)
 }
 
@@ -94,15 +94,15 @@ struct Normal {
 }
 
 impl Normal {
-    fn new(search: &Search, active: &[Active]) -> Option<Self> {
+    fn new(search: &Search, in_model: &[ModelTerm]) -> Option<Self> {
         let rows = search.rows;
         let fold_of = owners(search)?;
         let mut white = rows.linear.constant.clone();
         rows.whiten(&mut white);
         let mut owner = vec![None; white.ncols()];
         // Where one stands for what was the shape of another, the shape of either would do without the other.
-        let shaped = !active.iter().any(|effect| effect.hidden);
-        for (i, effect) in active.iter().enumerate() {
+        let shaped = !in_model.iter().any(|effect| effect.hidden);
+        for (i, effect) in in_model.iter().enumerate() {
             let all = [&effect.columns, &effect.state, &effect.shape];
             for own in &all[..if shaped { 3 } else { 2 }] {
                 let at = white.ncols();
@@ -113,8 +113,8 @@ impl Normal {
         }
         let mut folds = grams(&white, &rows.residual, &fold_of);
         for (gram, b) in &mut folds {
-            *gram /= search.heat;
-            *b /= search.heat;
+            *gram /= search.overdispersion;
+            *b /= search.overdispersion;
         }
         Some(Normal { folds, owner })
     }
@@ -178,9 +178,9 @@ fn grams(
 /// What predicts stretches that were left out no worse: effects without which their mean square would fall by more than this factor
 /// go, the worst first; and all of them, where together they do no better than geometry alone. In motion, where noise is known,
 /// effects stay of which the other stretches foretell how little they know of them in the one that was left out.
-pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Active> {
-    let mut kept = active.to_vec();
-    let are_harm = |kept: &[Active]| {
+pub(super) fn useful(search: &Search, in_model: &[ModelTerm], factor: f64) -> Vec<ModelTerm> {
+    let mut kept = in_model.to_vec();
+    let are_harm = |kept: &[ModelTerm]| {
         !search.in_motion || foretold_without_all(search, kept).is_none_or(|without| without > 0.0)
     };
     while let Some(folds) = Folds::new(search, &kept) {
@@ -198,8 +198,8 @@ pub(super) fn useful(search: &Search, active: &[Active], factor: f64) -> Vec<Act
 }
 
 /// Whether effects make the mean square of stretches that were left out so many times that of geometry alone.
-pub(super) fn worsen(search: &Search, active: &[Active], factor: f64) -> bool {
-    Folds::new(search, active).is_some_and(|folds| folds.without_all(search) > factor)
+pub(super) fn worsen(search: &Search, in_model: &[ModelTerm], factor: f64) -> bool {
+    Folds::new(search, in_model).is_some_and(|folds| folds.without_all(search) > factor)
 }
 
 /// Normal equations of all samples and of each fold.
@@ -220,21 +220,21 @@ enum Part {
     Geometry,
     Effect(usize),
     /// What an effect was before anybody looked.
-    State(usize),
+    InitialCondition(usize),
 }
 
 impl Part {
     fn effect(self) -> Option<usize> {
         match self {
             Part::Geometry => None,
-            Part::Effect(i) | Part::State(i) => Some(i),
+            Part::Effect(i) | Part::InitialCondition(i) => Some(i),
         }
     }
 }
 
 impl Folds {
     /// `None` where there are too few rows, or a column cannot be built.
-    fn new(search: &Search, told: &[Active]) -> Option<Self> {
+    fn new(search: &Search, told: &[ModelTerm]) -> Option<Self> {
         let rows = search.rows;
         let linear = rows.linear;
         let mut raw = linear.constant.clone();
@@ -250,7 +250,7 @@ impl Folds {
         }
         for (i, effect) in told.iter().enumerate() {
             if let Some(states) = search.states_of(effect) {
-                put(&states.raw(rows), Part::State(i));
+                put(&states.raw(rows), Part::InitialCondition(i));
             }
         }
         let owner = owners(search)?;
@@ -261,9 +261,9 @@ impl Folds {
     }
 
     /// By which factor the mean square of what is left out grows with each effect beside all others.
-    fn without_each(&self, search: &Search, active: &[Active]) -> Vec<f64> {
+    fn without_each(&self, search: &Search, in_model: &[ModelTerm]) -> Vec<f64> {
         let all = self.energy(search, &|_| true);
-        (0..active.len()).map(|i| all / self.energy(search, &|effect| effect != i)).collect()
+        (0..in_model.len()).map(|i| all / self.energy(search, &|effect| effect != i)).collect()
     }
 
     /// By which factor it grows with all effects beside geometry.
@@ -284,8 +284,8 @@ impl Folds {
     fn left_out(&self, search: &Search, takes: &dyn Fn(usize) -> bool) -> Vec<f64> {
         let used = |c: &usize| self.part[*c].effect().is_none_or(takes);
         let columns: Vec<usize> = (0..self.part.len()).filter(used).collect();
-        // States come last.
-        let lasting = columns.iter().filter(|c| !matches!(self.part[**c], Part::State(_))).count();
+        // Initial conditions come last.
+        let lasting = columns.iter().filter(|c| !matches!(self.part[**c], Part::InitialCondition(_))).count();
         let states = columns.len() - lasting;
         let of_columns = |(gram, b): (&DMatrix<f64>, &DVector<f64>)| {
             (gram.select_rows(&columns).select_columns(&columns), b.select_rows(&columns))

@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::search::{Active, Search};
-use super::space::gram;
+use super::marginal::gram;
+use super::search::{ModelTerm, Search};
 use crate::effects::{Candidate, Identified, Library};
 
 /// Constant deviations and effects solved together.
@@ -47,11 +47,11 @@ impl Solved {
 }
 
 impl Model {
-    pub fn new(search: &Search, active: &[Active]) -> Self {
+    pub fn new(search: &Search, in_model: &[ModelTerm]) -> Self {
         let mut columns = search.rows.linear.constant.clone();
         search.rows.whiten(&mut columns);
         let mut offsets = Vec::new();
-        for effect in active {
+        for effect in in_model {
             let at = columns.ncols();
             offsets.push(at);
             for own in [&effect.columns, &effect.state] {
@@ -73,8 +73,8 @@ impl Model {
     }
 
     /// Coefficients of effect `i` in SI, those that take part.
-    pub fn coefficients(&self, search: &Search, active: &[Active], i: usize) -> Vec<f64> {
-        let effect = &active[i];
+    pub fn coefficients(&self, search: &Search, in_model: &[ModelTerm], i: usize) -> Vec<f64> {
+        let effect = &in_model[i];
         let units = search.rows.units(&search.candidates[effect.candidate], &effect.score.parameters);
         let own = &self.solution.as_slice()[self.offsets[i]..self.offsets[i] + effect.columns.ncols()];
         own.iter().zip(units).map(|(x, unit)| x * unit * effect.score.room).collect()
@@ -82,17 +82,17 @@ impl Model {
 
     /// Residuals in m and rad with everything taken away: constants, effects, and what these were before anybody looked. Columns are taken
     /// before whitening.
-    pub fn residual(&self, search: &Search, active: &[Active]) -> Vec<f64> {
-        let mut left = self.residual_without(search, active, |_| true);
-        for early in (0..active.len()).filter_map(|i| self.early(search, active, i)) {
+    pub fn residual(&self, search: &Search, in_model: &[ModelTerm]) -> Vec<f64> {
+        let mut left = self.residual_without(search, in_model, |_| true);
+        for early in (0..in_model.len()).filter_map(|i| self.early(search, in_model, i)) {
             left.iter_mut().zip(early).for_each(|(left, early)| *left -= early);
         }
         left
     }
 
     /// What effect `i` was before anybody looked, beside what its family says, m and rad; `None` where that is known.
-    pub fn early(&self, search: &Search, active: &[Active], i: usize) -> Option<Vec<f64>> {
-        let effect = &active[i];
+    pub fn early(&self, search: &Search, in_model: &[ModelTerm], i: usize) -> Option<Vec<f64>> {
+        let effect = &in_model[i];
         if effect.state.ncols() == 0 {
             return None;
         }
@@ -106,14 +106,14 @@ impl Model {
     pub fn residual_without(
         &self,
         search: &Search,
-        active: &[Active],
+        in_model: &[ModelTerm],
         is_taken: impl Fn(&Candidate) -> bool,
     ) -> Vec<f64> {
         let linear = search.rows.linear;
         let mut left = DVector::from_column_slice(&linear.residual);
         let constants = linear.constant.ncols();
         left -= &linear.constant * self.solution.rows(0, constants);
-        for (i, effect) in active.iter().enumerate() {
+        for (i, effect) in in_model.iter().enumerate() {
             let candidate = &search.candidates[effect.candidate];
             if !is_taken(candidate) {
                 continue;
@@ -129,14 +129,14 @@ impl Model {
 
     /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together. `shape`: part of
     /// what shapes may depart from the families' by which they do.
-    pub fn effect(&self, search: &Search, active: &[Active], i: usize, shape: f64) -> Solved {
-        let effect = &active[i];
+    pub fn effect(&self, search: &Search, in_model: &[ModelTerm], i: usize, shape: f64) -> Solved {
+        let effect = &in_model[i];
         let candidate = &search.candidates[effect.candidate];
         let units = search.rows.units(candidate, &effect.score.parameters);
         let (k, all, parameters) =
             (effect.columns.ncols(), candidate.coefficients.len(), effect.score.parameters.len());
         let scale = |c: usize| effect.score.room * units[c];
-        let mut coefficients = self.coefficients(search, active, i);
+        let mut coefficients = self.coefficients(search, in_model, i);
         coefficients.resize(all, 0.0);
         // Derivatives by the parameters join the columns.
         let weights = DVector::from_fn(k, |c, _| coefficients[c] / units[c].max(1e-300));
@@ -157,7 +157,7 @@ impl Model {
         for (s, (_, column, range)) in slopes.iter().enumerate() {
             wide.set_column(at + s, &(column * *range));
         }
-        for effect in active {
+        for effect in in_model {
             let at = wide.ncols();
             wide = wide.insert_columns(at, effect.shape.ncols(), 0.0);
             wide.columns_mut(at, effect.shape.ncols()).copy_from(&(&effect.shape * shape));
@@ -178,15 +178,15 @@ impl Model {
     }
 
     /// Middle and standard deviation of a parameter that jumps, between the places where the data begin to speak against it.
-    pub fn jumping(search: &Search, active: &[Active], i: usize, p: usize) -> Option<(f64, f64)> {
-        let effect = &active[i];
+    pub fn jumping(search: &Search, in_model: &[ModelTerm], i: usize, p: usize) -> Option<(f64, f64)> {
+        let effect = &in_model[i];
         let candidate = &search.candidates[effect.candidate];
         let (at, parameter) = (&effect.score.parameters, &candidate.parameters[p]);
-        let field = search.rows.field(search.beside(active, Some(i)));
+        let field = search.rows.field(search.beside(in_model, Some(i)));
         let evidence = |value: f64| {
             let mut moved = at.clone();
             moved[p] = value;
-            search.rows.score_at(candidate, &moved, &field, search.heat).map(|score| score.at_best)
+            search.rows.score_at(candidate, &moved, &field, search.overdispersion).map(|score| score.at_best)
         };
         let best = evidence(at[p])?;
         let edge = |to: f64| {

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 /// Lengths of blocks, readings.
 const LENGTHS: [usize; 5] = [4, 8, 16, 32, 64];
-/// Longer ones, for the heat alone.
+/// Longer ones, for the overdispersion alone.
 const LONG: [usize; 2] = [128, 256];
 /// Readings of a stretch, and bands into which its spectrum is divided.
 const STRETCH: usize = 64;
@@ -28,7 +28,7 @@ pub(super) struct Leftover {
     /// How far beyond chance it is at the length of block where that is most, standard deviations.
     pub beyond: f64,
     /// Variance of block sums over that of noise, at the length where that is most and there are enough blocks: 1 for noise.
-    pub heat: f64,
+    pub overdispersion: f64,
     /// Usual power of the loudest band over that of white noise, no less than 1: how far the noise is from what it is taken for.
     pub band: f64,
 }
@@ -37,7 +37,7 @@ pub(super) struct Leftover {
 pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Leftover {
     let kept: Vec<Vec<f64>> =
         runs.iter().map(|run| run.iter().filter(|r| !out[**r]).map(|r| residual[*r]).collect()).collect();
-    let mut worst = Leftover { heat: 1.0, band: 1.0, ..Leftover::default() };
+    let mut worst = Leftover { overdispersion: 1.0, band: 1.0, ..Leftover::default() };
     for length in LENGTHS {
         let (mut count, mut excess) = (0usize, 0.0);
         for block in kept.iter().flat_map(|run| run.chunks_exact(length)) {
@@ -52,7 +52,7 @@ pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Le
         if beyond > worst.beyond {
             (worst.beyond, worst.energy) = (beyond, excess);
         }
-        worst.heat = worst.heat.max(1.0 + excess / count as f64);
+        worst.overdispersion = worst.overdispersion.max(1.0 + excess / count as f64);
     }
     for length in LONG {
         let sums =
@@ -63,8 +63,8 @@ pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Le
         }
         let count = squares.len() as f64;
         // Few blocks: what chance alone may add is left out.
-        let heat = squares.iter().sum::<f64>() / count / (1.0 + 2.0 * (2.0 / count).sqrt());
-        worst.heat = worst.heat.max(heat);
+        let overdispersion = squares.iter().sum::<f64>() / count / (1.0 + 2.0 * (2.0 / count).sqrt());
+        worst.overdispersion = worst.overdispersion.max(overdispersion);
     }
     let Some((energy, beyond, band)) = loud(&kept) else { return worst };
     worst.band = band;

@@ -1,7 +1,7 @@
-//! How likely a name is among its rivals, and which of them are told with it, `docs/diagnosis-method.md` (64).
+//! How likely a name is among its hypotheses, and which of them are told with it, `docs/diagnosis-method.md` (64).
 
 use super::finding::Confusable;
-use super::search::{Rival, Search, VISIBLE};
+use super::search::{Hypothesis, Search, VISIBLE};
 use crate::effects::{Family, Place};
 use crate::machine::Machine;
 
@@ -21,9 +21,9 @@ const ODDER: f64 = 0.12;
 const LEAST: f64 = 0.55;
 const SLIGHT: f64 = 30.0;
 
-/// What one rival has for itself.
+/// What one hypothesis has for itself.
 pub(super) struct Odds<'a> {
-    pub rival: &'a Rival,
+    pub hypothesis: &'a Hypothesis,
     pub probability: f64,
     /// Whether it is told beside the best one.
     pub is_listed: bool,
@@ -35,44 +35,49 @@ pub(super) fn trust(shape: f64, bic: f64) -> f64 {
     (LEAST + (1.0 - LEAST) / (1.0 + odd)) / (1.0 + slight)
 }
 
-/// Probability of every rival, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.
-/// `heat`: that of the weights, `is_plain`: a common family in its own shape.
+/// Probability of every hypothesis, (64): by its weight, and to a part by weights that a shape which nobody knows may shift.
+/// `overdispersion`: that of the weights, `is_plain`: a common family in its own shape.
 pub(super) fn odds<'a>(
     search: &Search,
-    rivals: &'a [Rival],
-    own: &Rival,
-    heat: f64,
+    hypotheses: &'a [Hypothesis],
+    own: &Hypothesis,
+    overdispersion: f64,
     is_plain: bool,
 ) -> Vec<Odds<'a>> {
     let unsure = if is_plain { 0.0 } else { UNSURE };
-    let place = |r: &Rival| search.candidates[r.candidate].place;
-    let effect = |r: &Rival| &search.candidates[r.candidate].told_as;
-    let plain = |r: &Rival| (r.weight - own.weight).exp();
+    let place = |r: &Hypothesis| search.candidates[r.candidate].place;
+    let effect = |r: &Hypothesis| &search.candidates[r.candidate].told_as;
+    let plain = |r: &Hypothesis| (r.weight - own.weight).exp();
     let visible = VISIBLE * search.rows.whitener.count() as f64;
-    let shift = 1.0 + (SHIFT * own.score.gain).min(visible) / heat;
+    let shift = 1.0 + (SHIFT * own.score.gain).min(visible) / overdispersion;
     // Another name at its place, or the same at another place.
-    let is_alike = |r: &Rival| place(r) == place(own) || effect(r) == effect(own);
-    let is_same = |r: &Rival| search.is_form(r.candidate, own.candidate);
-    let shifted = |r: &Rival| {
+    let is_alike = |r: &Hypothesis| place(r) == place(own) || effect(r) == effect(own);
+    let is_same = |r: &Hypothesis| search.is_form(r.candidate, own.candidate);
+    let shifted = |r: &Hypothesis| {
         if is_alike(r) { ((r.weight - own.weight) / shift).exp() } else { 0.0 }
     };
     let nothing = (-own.weight).exp();
     let (all, all_alike) =
-        (rivals.iter().map(plain).sum::<f64>() + nothing, rivals.iter().map(shifted).sum::<f64>());
-    let beside = rivals.iter().filter(|r| is_alike(r)).map(plain).sum::<f64>() / all;
-    let probability = |r: &Rival| (1.0 - unsure) * plain(r) / all + unsure * beside * shifted(r) / all_alike;
-    let is_common = |r: &Rival| search.commonness[r.candidate] > search.commonness[own.candidate] - RARER;
-    let listed = |r: &Rival| {
+        (hypotheses.iter().map(plain).sum::<f64>() + nothing, hypotheses.iter().map(shifted).sum::<f64>());
+    let beside = hypotheses.iter().filter(|r| is_alike(r)).map(plain).sum::<f64>() / all;
+    let probability =
+        |r: &Hypothesis| (1.0 - unsure) * plain(r) / all + unsure * beside * shifted(r) / all_alike;
+    let is_common =
+        |r: &Hypothesis| search.commonness[r.candidate] > search.commonness[own.candidate] - RARER;
+    let listed = |r: &Hypothesis| {
         probability(r) > LISTED * probability(own) || !is_plain && shifted(r) > ALIKE && is_common(r)
     };
-    let one =
-        |rival| Odds { rival, probability: probability(rival), is_listed: !is_same(rival) && listed(rival) };
-    rivals.iter().map(one).collect()
+    let one = |hypothesis| Odds {
+        hypothesis,
+        probability: probability(hypothesis),
+        is_listed: !is_same(hypothesis) && listed(hypothesis),
+    };
+    hypotheses.iter().map(one).collect()
 }
 
-/// A rival as it is told beside a finding of this family.
+/// A hypothesis as it is told beside a finding of this family.
 pub(super) fn confusable(odds: &Odds, search: &Search, machine: &Machine, family: &Family) -> Confusable {
-    let candidate = &search.candidates[odds.rival.candidate];
+    let candidate = &search.candidates[odds.hypothesis.candidate];
     let told = family.look_alikes.iter().find(|l| l.effect == candidate.effect);
     let at = candidate.place.name(machine);
     Confusable {

@@ -2,11 +2,11 @@
 
 use super::diagnosis::Diagnosis;
 use super::finding::{Confusable, Finding, Size};
-use super::search::{Active, Search};
+use super::search::{ModelTerm, Search};
 
 /// Makes one finding of those that are orders of one error motion, where the first of them stands. Shares, held-out figures and curves
 /// are those of all its orders already.
-pub(super) fn join(search: &Search, told: &[Active], diagnosis: &mut Diagnosis) {
+pub(super) fn join(search: &Search, told: &[ModelTerm], diagnosis: &mut Diagnosis) {
     let first_of = |i: usize| (0..i).find(|k| search.is_one(told[*k].candidate, told[i].candidate));
     let firsts: Vec<Option<usize>> = (0..told.len()).map(first_of).collect();
     for (i, first) in firsts.iter().enumerate() {

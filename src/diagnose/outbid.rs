@@ -1,7 +1,7 @@
 //! Several names that one place without a name outbids: a patchwork, `docs/diagnosis-method.md` (77).
 
 use super::evidence::log_mean_exp;
-use super::search::{Active, Search};
+use super::search::{ModelTerm, Search};
 use super::series::Standing;
 use super::whereabouts::standing;
 use crate::machine::Machine;
@@ -20,26 +20,26 @@ const SAYS_ALL: f64 = 0.9;
 /// joints give way there in their own ways.
 pub(super) fn outbid(
     search: &Search,
-    active: &[Active],
+    in_model: &[ModelTerm],
     machine: &Machine,
 ) -> Option<(Standing, Option<usize>)> {
-    if active.len() < 2 || !search.in_motion {
+    if in_model.len() < 2 || !search.in_motion {
         return None;
     }
-    let rare: f64 = active.iter().map(|effect| search.priors[effect.candidate]).sum();
+    let rare: f64 = in_model.iter().map(|effect| search.priors[effect.candidate]).sum();
     // Orders of one error motion are each other's shape.
-    let are_one = active[1..].iter().all(|effect| search.is_one(active[0].candidate, effect.candidate));
+    let are_one = in_model[1..].iter().all(|effect| search.is_one(in_model[0].candidate, effect.candidate));
     let names = if are_one {
-        let plain: Vec<Active> = active.iter().map(Active::without_shape).collect();
-        log_mean_exp(&[search.worth(active), search.worth(&plain)]) + rare
+        let plain: Vec<ModelTerm> = in_model.iter().map(ModelTerm::without_shape).collect();
+        log_mean_exp(&[search.worth(in_model), search.worth(&plain)]) + rare
     } else {
-        search.worth(active) + rare
+        search.worth(in_model) + rare
     };
     let series = standing(search, machine, search.base.clone())?;
     let says_all = |i: &usize| {
-        let effect = &active[*i..=*i];
-        search.candidates[active[*i].candidate].place == series.place
+        let effect = &in_model[*i..=*i];
+        search.candidates[in_model[*i].candidate].place == series.place
             && search.shares(effect).names > 2.0 * SAYS_ALL * series.gain
     };
-    (series.evidence > names + AHEAD).then(|| (series, (0..active.len()).find(says_all)))
+    (series.evidence > names + AHEAD).then(|| (series, (0..in_model.len()).find(says_all)))
 }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::score::{Score, best, judge, lengths};
-use super::search::{Active, Rival, Search};
+use super::search::{Hypothesis, ModelTerm, Search};
 use crate::effects::{Candidate, Place};
 use crate::machine::Machine;
 
@@ -24,16 +24,21 @@ const PARTS: usize = 4;
 
 /// The best one for effect `i`: driven by the motion of another joint, searched for over its whole grid as the effect itself was; of
 /// weights, which are different numbers at every joint, those that act in other poses. `None` where there is no such thing.
-pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Machine) -> Option<Placebo> {
-    let (effect, rows) = (&active[i], search.rows);
+pub(super) fn placebo(
+    search: &Search,
+    in_model: &[ModelTerm],
+    i: usize,
+    machine: &Machine,
+) -> Option<Placebo> {
+    let (effect, rows) = (&in_model[i], search.rows);
     let own = &search.candidates[effect.candidate];
-    let field = rows.field(search.beside(active, Some(i)));
-    let here = rows.score_at(own, &effect.score.parameters, &field, search.heat)?;
+    let field = rows.field(search.beside(in_model, Some(i)));
+    let here = rows.score_at(own, &effect.score.parameters, &field, search.overdispersion)?;
     let weighs = own.features.iter().any(|feature| feature.needs_gravity());
     // Half the energy that it takes away, and its evidence; what it was before anybody looked is no less its own.
     let says = |candidate: &Candidate, score: &Score| {
-        let rival = Rival::new(effect.candidate, score.at_best, score.clone());
-        match search.with_state(candidate, &rival, &field) {
+        let hypothesis = Hypothesis::new(effect.candidate, score.at_best, score.clone());
+        match search.with_state(candidate, &hypothesis, &field) {
             Some(more) if more.evidence > 0.0 => (more.reach, score.at_best + more.evidence),
             _ => (score.gain, score.at_best),
         }
@@ -51,7 +56,7 @@ pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Ma
     let driven = search.candidates.iter().enumerate().filter_map(|(k, other)| {
         let joint = moved_by(own, other)?;
         let candidate = Candidate { coefficients: own.coefficients.clone(), ..other.clone() };
-        let score = rows.screen(k, &candidate, &field, search.heat)?;
+        let score = rows.screen(k, &candidate, &field, search.overdispersion)?;
         let what = if weighs { "the weight on" } else { "the motion of" };
         let cause = format!("{what} {}", Place::Joint(joint).name(machine));
         Some(of(cause, &candidate, &score, &rows.raw(&candidate, &score.parameters)?))
@@ -62,8 +67,8 @@ pub(super) fn placebo(search: &Search, active: &[Active], i: usize, machine: &Ma
         rows.whiten(&mut white);
         let usual = rows.usual_sizes(own, std::slice::from_ref(&effect.score.parameters));
         let (at, mut score) = (&effect.score.parameters, None);
-        judge(&white.as_view(), &field.space, &field.left, &[0], &mut |_, equations| {
-            score = Some(best(own, at, &lengths(own), equations, search.heat, usual).at(at));
+        judge(&white.as_view(), &field.marginal, &field.left, &[0], &mut |_, equations| {
+            score = Some(best(own, at, &lengths(own), equations, search.overdispersion, usual).at(at));
         });
         Some(of("the weights of other poses".into(), own, &score?, &raw))
     });

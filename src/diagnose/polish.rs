@@ -4,9 +4,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::enter::solved;
+use super::marginal::Marginal;
 use super::score::Score;
-use super::search::{Active, Rival, Search};
-use super::space::Space;
+use super::search::{Hypothesis, ModelTerm, Search};
 
 /// Times that all effects are looked at, where there are several; steps of each.
 const ROUNDS: usize = 2;
@@ -20,31 +20,31 @@ impl Search<'_> {
     /// Effects with their smooth parameters moved to where the evidence is greatest.
     ///
     /// The search stops where a parameter is known well enough to tell names apart, some half of a standard deviation off.
-    pub fn polished(&self, active: &[Active]) -> Vec<Active> {
-        let mut active = active.to_vec();
-        let is_smooth = |e: &Active| self.candidates[e.candidate].parameters.iter().any(|p| p.smooth);
-        let smooth: Vec<usize> = (0..active.len()).filter(|i| is_smooth(&active[*i])).collect();
+    pub fn polished(&self, in_model: &[ModelTerm]) -> Vec<ModelTerm> {
+        let mut in_model = in_model.to_vec();
+        let is_smooth = |e: &ModelTerm| self.candidates[e.candidate].parameters.iter().any(|p| p.smooth);
+        let smooth: Vec<usize> = (0..in_model.len()).filter(|i| is_smooth(&in_model[*i])).collect();
         for _ in 0..if smooth.len() > 1 { ROUNDS } else { 1 } {
             for i in &smooth {
-                if let Some(moved) = self.moved(&active, *i) {
-                    active[*i] = moved.instead_of(&active[*i]);
+                if let Some(moved) = self.moved(&in_model, *i) {
+                    in_model[*i] = moved.instead_of(&in_model[*i]);
                 }
             }
         }
-        active
+        in_model
     }
 
     /// Effect `i` with its parameters moved; `None` where nothing is gained.
-    fn moved(&self, active: &[Active], i: usize) -> Option<Active> {
-        let effect = &active[i];
+    fn moved(&self, in_model: &[ModelTerm], i: usize) -> Option<ModelTerm> {
+        let effect = &in_model[i];
         let candidate = &self.candidates[effect.candidate];
-        let beside = self.beside(active, Some(i));
+        let beside = self.beside(in_model, Some(i));
         let field = self.rows.field(beside.with(&effect.state));
-        let at = |parameters: &[f64]| self.rows.score_at(candidate, parameters, &field, self.heat);
+        let at = |parameters: &[f64]| self.rows.score_at(candidate, parameters, &field, self.overdispersion);
         let start = at(&effect.score.parameters)?;
         let mut best = start.clone();
         for _ in 0..STEPS {
-            let Some(there) = self.step(effect, &best, &field.space).and_then(|to| at(&to)) else { break };
+            let Some(there) = self.step(effect, &best, &field.marginal).and_then(|to| at(&to)) else { break };
             let gained = there.at_best - best.at_best;
             if gained > 0.0 {
                 best = there;
@@ -59,16 +59,16 @@ impl Search<'_> {
         let evidence = effect.score.evidence + best.at_best - start.at_best;
         let score =
             Score { evidence, at_best: best.at_best, parameters: best.parameters, ..effect.score.clone() };
-        self.enter(&Rival::new(effect.candidate, evidence, score), &beside)
+        self.enter(&Hypothesis::new(effect.candidate, evidence, score), &beside)
     }
 
-    /// Parameters one step on, beside a space.
-    fn step(&self, effect: &Active, from: &Score, space: &Space) -> Option<Vec<f64>> {
+    /// Parameters one step on, beside a marginal.
+    fn step(&self, effect: &ModelTerm, from: &Score, marginal: &Marginal) -> Option<Vec<f64>> {
         let candidate = &self.candidates[effect.candidate];
         let units = self.rows.units(candidate, &from.parameters);
         let own = self.rows.of(candidate, &from.parameters)?;
         let own = own.columns(0, effect.columns.ncols()) * from.room;
-        let coefficients = self.solved_beside(&own, space)? * from.room;
+        let coefficients = self.solved_beside(&own, marginal)? * from.room;
         let free = candidate.parameters.iter().enumerate().filter(|(_, p)| p.smooth);
         let free: Vec<(usize, f64)> =
             free.map(|(p, parameter)| (p, parameter.range.1 - parameter.range.0)).collect();
@@ -84,7 +84,7 @@ impl Search<'_> {
         }
         let mut both = own.insert_columns(effect.columns.ncols(), free.len(), 0.0);
         both.columns_mut(effect.columns.ncols(), free.len()).copy_from(&slopes);
-        let solution = self.solved_beside(&both, space)?;
+        let solution = self.solved_beside(&both, marginal)?;
         let mut to = from.parameters.clone();
         for ((p, range), step) in free.iter().zip(solution.rows_range(effect.columns.ncols()..).iter()) {
             let (low, high) = candidate.parameters[*p].range_around(to[*p]);
@@ -93,9 +93,9 @@ impl Search<'_> {
         Some(to)
     }
 
-    /// Numbers of these whitened columns beside a space, with their prior.
-    fn solved_beside(&self, columns: &DMatrix<f64>, space: &Space) -> Option<DVector<f64>> {
-        let (gram, toward) = self.normal(columns, space);
+    /// Numbers of these whitened columns beside a marginal, with their prior.
+    fn solved_beside(&self, columns: &DMatrix<f64>, marginal: &Marginal) -> Option<DVector<f64>> {
+        let (gram, toward) = self.normal(columns, marginal);
         solved(gram, &toward)
     }
 }

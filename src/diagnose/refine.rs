@@ -2,7 +2,7 @@
 
 use super::enter::solved;
 use super::score::{Field, Rows, Score};
-use super::search::Rival;
+use super::search::Hypothesis;
 use crate::effects::{Candidate, Parameter};
 
 /// Rounds over several parameters; parabolas at most, as long as they bring so much, or halvings of a step where nothing is smooth, for
@@ -24,17 +24,23 @@ const ALONE: f64 = 0.1;
 const NEVER: f64 = -1e6;
 
 /// Moves the parameters between the points of the grid to where the evidence is greatest, from every point that may lead there.
-pub(super) fn refine(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
-    let best = refined(rows, candidate, rival, field, heat);
-    let others = rival.score.also.iter().filter_map(|parameters| {
-        let here = rows.score_at(candidate, parameters, field, heat)?;
-        let lower = rival.score.at_best - here.at_best;
-        let score = Score { evidence: rival.score.evidence - lower, ..here };
-        let start = Rival { weight: rival.weight - lower, score, ..rival.clone() };
-        Some(refined(rows, candidate, &start, field, heat))
+pub(super) fn refine(
+    rows: &Rows,
+    candidate: &Candidate,
+    hypothesis: &Hypothesis,
+    field: &Field,
+    overdispersion: f64,
+) -> Hypothesis {
+    let best = refined(rows, candidate, hypothesis, field, overdispersion);
+    let others = hypothesis.score.also.iter().filter_map(|parameters| {
+        let here = rows.score_at(candidate, parameters, field, overdispersion)?;
+        let lower = hypothesis.score.at_best - here.at_best;
+        let score = Score { evidence: hypothesis.score.evidence - lower, ..here };
+        let start = Hypothesis { weight: hypothesis.weight - lower, score, ..hypothesis.clone() };
+        Some(refined(rows, candidate, &start, field, overdispersion))
     });
-    let all: Vec<Rival> = others.chain([best.clone()]).collect();
-    let weight = |r: &Rival| {
+    let all: Vec<Hypothesis> = others.chain([best.clone()]).collect();
+    let weight = |r: &Hypothesis| {
         let has_half =
             all.iter().any(|other| candidate.is_half(&other.score.parameters, &r.score.parameters));
         match has_half {
@@ -53,7 +59,7 @@ fn is_overtone_alone(rows: &Rows, candidate: &Candidate, score: &Score, field: &
         return false;
     };
     let columns = columns.columns(0, score.coefficients) * score.room;
-    let along = field.space.along(&columns.as_view());
+    let along = field.marginal.along(&columns.as_view());
     let gram = columns.tr_mul(&columns) - along.tr_mul(&along);
     let Some(solution) = solved(gram, &columns.tr_mul(&field.left)) else { return false };
     let size = |from: usize| solution.rows(from, PAIR).norm();
@@ -61,17 +67,23 @@ fn is_overtone_alone(rows: &Rows, candidate: &Candidate, score: &Score, field: &
 }
 
 /// The same from one point; the evidence over the grid grows alike.
-fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, heat: f64) -> Rival {
-    let at = |parameters: &[f64]| rows.score_at(candidate, parameters, field, heat);
-    let start = rival.score.at_best;
-    let Some(here) = at(&rival.score.parameters) else { return rival.clone() };
-    let mut best = Score { evidence: rival.score.evidence, ..here };
+fn refined(
+    rows: &Rows,
+    candidate: &Candidate,
+    hypothesis: &Hypothesis,
+    field: &Field,
+    overdispersion: f64,
+) -> Hypothesis {
+    let at = |parameters: &[f64]| rows.score_at(candidate, parameters, field, overdispersion);
+    let start = hypothesis.score.at_best;
+    let Some(here) = at(&hypothesis.score.parameters) else { return hypothesis.clone() };
+    let mut best = Score { evidence: hypothesis.score.evidence, ..here };
     let free: Vec<usize> =
         (0..candidate.parameters.len()).filter(|p| !candidate.parameters[*p].whole).collect();
     let mut steps: Vec<f64> = free.iter().map(|p| 0.5 * spacing(candidate, *p, &best.parameters)).collect();
     for _ in 0..if free.len() > 1 { ROUNDS } else { 1 } {
         for (p, step) in free.iter().zip(&mut steps) {
-            let (low, high) = candidate.parameters[*p].range_around(rival.score.parameters[*p]);
+            let (low, high) = candidate.parameters[*p].range_around(hypothesis.score.parameters[*p]);
             let moved = |to: f64, best: &mut Score| {
                 let mut parameters = best.parameters.clone();
                 parameters[*p] = to.clamp(low, high);
@@ -109,12 +121,12 @@ fn refined(rows: &Rows, candidate: &Candidate, rival: &Rival, field: &Field, hea
         parameter.pieces.iter().any(|(from, to)| (p - from).abs() < 1.0 || (p - to).abs() < 1.0)
     };
     if best.parameters.iter().zip(&candidate.parameters).any(ends) {
-        return Rival { weight: NEVER, ..rival.clone() };
+        return Hypothesis { weight: NEVER, ..hypothesis.clone() };
     }
     let grown = best.at_best - start;
     best.evidence += grown;
-    let reach = rival.reach + best.gain - rival.score.gain;
-    Rival { candidate: rival.candidate, weight: rival.weight + grown, score: best, reach }
+    let reach = hypothesis.reach + best.gain - hypothesis.score.gain;
+    Hypothesis { candidate: hypothesis.candidate, weight: hypothesis.weight + grown, score: best, reach }
 }
 
 /// Distance to the next point of the grid with the same other parameters, or with any.

@@ -2,23 +2,23 @@
 
 use super::along::along_travel;
 use super::approaches::approaches;
-use super::companions::{self, Companion};
 use super::contained::says_no_more;
 use super::diagnosis::{Diagnosis, Named, by_model, rms_of};
 use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
 use super::held_out::Model;
+use super::marginal::Marginal;
 use super::noise::Noise;
 use super::odds::{Odds, confusable, odds, trust};
 use super::orders;
 use super::outbid::outbid;
 use super::outliers;
 use super::placebo::{Placebo, placebo};
-use super::search::{Active, Rival, Search, all_but};
+use super::search::{Hypothesis, ModelTerm, Search, all_but};
 use super::series::Standing;
 use super::set_ups;
+use super::shared::{self, Companion};
 use super::shares::Shares;
-use super::space::Space;
 use super::speeds::levelled;
 use super::stretch::wheres;
 use super::traces::{self, Traces};
@@ -58,46 +58,46 @@ const LIKELY: f64 = 0.5;
 const OUTDONE: f64 = 5.0;
 
 /// Residuals with the effects taken away, m and rad.
-pub(super) fn residual_of(search: &Search, active: &[Active]) -> Vec<f64> {
-    Model::new(search, active).residual(search, active)
+pub(super) fn residual_of(search: &Search, in_model: &[ModelTerm]) -> Vec<f64> {
+    Model::new(search, in_model).residual(search, in_model)
 }
 
 /// Everything that is said of the effects that the search took in.
 pub(super) fn report(
     search: &Search,
-    active: &[Active],
+    in_model: &[ModelTerm],
     machine: &Machine,
     library: &Library,
     noise: &[Noise],
 ) -> Diagnosis {
     let linear = search.rows.linear;
-    let shares = search.shares(active);
-    let mut doubt = match doubt(search, active, machine, &shares, noise) {
+    let shares = search.shares(in_model);
+    let mut doubt = match doubt(search, in_model, machine, &shares, noise) {
         Some(Doubt { but: Some(i), .. }) => {
-            return report(search, &active[i..=i], machine, library, noise);
+            return report(search, &in_model[i..=i], machine, library, noise);
         }
         doubt => doubt,
     };
     let mut told: Vec<(usize, Finding, Named)> = match doubt {
         Some(_) => Vec::new(),
         None => {
-            let model = Model::new(search, active);
-            let one = |i| finding(search, active, i, &shares, (machine, library), &model);
-            (0..active.len()).filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
+            let model = Model::new(search, in_model);
+            let one = |i| finding(search, in_model, i, &shares, (machine, library), &model);
+            (0..in_model.len()).filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
         }
     };
     let mut placebos: Vec<Option<Placebo>> =
-        told.iter().map(|(i, ..)| placebo(search, active, *i, machine)).collect();
+        told.iter().map(|(i, ..)| placebo(search, in_model, *i, machine)).collect();
     for ((_, finding, _), placebo) in told.iter_mut().zip(&placebos) {
         finding.placebo = placebo
             .as_ref()
             .map(|placebo| Meaningless { cause: placebo.cause.clone(), share: placebo.share });
     }
     let is_outdone = |placebo: &Option<Placebo>| placebo.as_ref().is_some_and(|p| p.ahead > OUTDONE);
-    let place = |i: &usize| search.candidates[active[*i].candidate].place;
+    let place = |i: &usize| search.candidates[in_model[*i].candidate].place;
     // What is said at a place beside a name for nothing is the rest of a patchwork.
     let empty: Vec<Place> = (told.iter().zip(&placebos))
-        .filter(|((i, ..), placebo)| is_outdone(placebo) || says_no_more(search, active, *i))
+        .filter(|((i, ..), placebo)| is_outdone(placebo) || says_no_more(search, in_model, *i))
         .map(|((i, ..), _)| place(i))
         .collect();
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
@@ -107,8 +107,8 @@ pub(super) fn report(
     if likely < told.len() {
         let unlikely = told.iter().filter(|told| !holds(told));
         doubt = unlikely
-            .max_by(|a, b| active[a.0].score.gain.total_cmp(&active[b.0].score.gain))
-            .map(|(i, ..)| Doubt::at(place(i), 2.0 * active[*i].score.gain));
+            .max_by(|a, b| in_model[a.0].score.gain.total_cmp(&in_model[b.0].score.gain))
+            .map(|(i, ..)| Doubt::at(place(i), 2.0 * in_model[*i].score.gain));
         // Of a patchwork no piece is a name.
         let patchwork = told.len() - likely > likely;
         let both = told.into_iter().zip(placebos).filter(|(told, _)| !patchwork && holds(told));
@@ -119,14 +119,14 @@ pub(super) fn report(
     all.sort_by(|(a, _), (b, _)| b.1.delta_bic.total_cmp(&a.1.delta_bic));
     let (told, placebos): (Vec<_>, Vec<_>) = all.into_iter().unzip();
     let unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
-    let kept: Vec<Active> = told.iter().map(|(i, ..)| active[*i].clone()).collect();
+    let kept: Vec<ModelTerm> = told.iter().map(|(i, ..)| in_model[*i].clone()).collect();
     let left_over = residual_of(search, &kept);
-    let companions = companions::companions(search, library, &kept);
+    let companions = shared::companions(search, library, &kept);
     let in_model = [kept.as_slice(), &companions].concat();
     let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
     let (findings, mut named): (Vec<Finding>, Vec<Named>) =
         told.into_iter().map(|(_, finding, named)| (finding, named)).unzip();
-    named.extend(companions::named(search, (machine, library), &kept, &companions));
+    named.extend(shared::named(search, (machine, library), &kept, &companions));
     let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
         recordings: linear.spans.iter().map(|s| s.label.clone()).collect(),
@@ -189,84 +189,88 @@ impl Doubt {
 /// Why the names that were taken in do not explain what is there, if they do not.
 fn doubt(
     search: &Search,
-    active: &[Active],
+    in_model: &[ModelTerm],
     machine: &Machine,
     shares: &Shares,
     noise: &[Noise],
 ) -> Option<Doubt> {
     let (left, total) = (&shares.left, shares.total());
-    let (surprise, deviation) = folds::surprise(search, active).unwrap_or((0.0, 1.0));
+    let (surprise, deviation) = folds::surprise(search, in_model).unwrap_or((0.0, 1.0));
     let memory = noise.iter().map(Noise::memory).fold(1.0, f64::max);
-    let patched = search.patched(active).or_else(|| search.wandering(active));
+    let patched = search.patched(in_model).or_else(|| search.wandering(in_model));
     // What sounds does so louder and softer, and hardly ever at quite one frequency.
-    let wanders = active.iter().any(|effect| search.is_tone(effect.candidate));
+    let wanders = in_model.iter().any(|effect| search.is_tone(effect.candidate));
     let is_unexplained = patched.is_some()
-        || left.beyond > CHANCE && (active.is_empty() || left.energy > TOLERATED * total)
-        || left.beyond > CHANCE && search.in_motion && active.len() >= search.most()
-        || active.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
-        || shares.is_misshapen(active.len())
-        || search.in_motion && active.len() > 1 && folds::worsen(search, active, WORSE)
+        || left.beyond > CHANCE && (in_model.is_empty() || left.energy > TOLERATED * total)
+        || left.beyond > CHANCE && search.in_motion && in_model.len() >= search.most()
+        || in_model.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
+        || shares.is_misshapen(in_model.len())
+        || search.in_motion && in_model.len() > 1 && folds::worsen(search, in_model, WORSE)
         || search.in_motion && !wanders && shares.is_unlike()
         || shares.shapes > ODD_SHAPE * total
-            && surprise > CHANCE * left.heat.max(1.0) * deviation
+            && surprise > CHANCE * left.overdispersion.max(1.0) * deviation
             && surprise > SURPRISE * memory * total;
     if is_unexplained {
         let energy = search.leftover(&search.base).energy.max(left.energy);
         return Some(Doubt { place: patched, with: None, energy, but: None });
     }
-    if let Some((series, but)) = outbid(search, active, machine) {
+    if let Some((series, but)) = outbid(search, in_model, machine) {
         return Some(Doubt { but, ..Doubt::standing(&series) });
     }
     let is_much = |energy: f64| energy > TOLERATED * (total + energy);
-    let beside = search.beside(active, None);
-    let series = |beside: Space| {
+    let beside = search.beside(in_model, None);
+    let series = |beside: Marginal| {
         standing(search, machine, beside)
             .filter(|series| series.evidence > STANDING && is_much(2.0 * series.gain))
             .map(|series| Doubt::standing(&series))
     };
     if search.in_motion {
         // What is much shows in blocks of samples, what is weak in a series alone.
-        return active.is_empty().then(|| series(beside)).flatten();
+        return in_model.is_empty().then(|| series(beside)).flatten();
     }
     // Settled positions show no course, but they may show a function of where a joint stands, or of something else that is known.
     let along = along_travel(search, machine, &beside)
-        .filter(|along| along.beyond > ALONG * search.heat && is_much(along.energy))
+        .filter(|along| along.beyond > ALONG * search.overdispersion && is_much(along.energy))
         .map(|along| Doubt::at(Place::Joint(along.joint), along.energy));
     along.or_else(|| series(beside))
 }
 
-/// What is said of effect `i`; nothing where its rivals leave too little evidence.
+/// What is said of effect `i`; nothing where its hypotheses leave too little evidence.
 fn finding(
     search: &Search,
-    active: &[Active],
+    in_model: &[ModelTerm],
     i: usize,
     shares: &Shares,
     (machine, library): (&Machine, &Library),
     model: &Model,
 ) -> Option<(Finding, Named)> {
-    let (left, total, effect) = (&shares.left, shares.total(), &active[i]);
-    let rivals = search.rivals_of(active, i);
-    let others = all_but(active, Some(i));
-    let fit = |r: &&Rival| r.candidate == effect.candidate || !search.repeats(r, &others);
-    let rivals: Vec<Rival> = rivals.iter().filter(fit).map(|r| search.tempered(r, left.heat)).collect();
-    let own = rivals.iter().find(|r| r.candidate == effect.candidate).filter(|r| r.weight > TOLD).cloned()?;
+    let (left, total, effect) = (&shares.left, shares.total(), &in_model[i]);
+    let hypotheses = search.rivals_of(in_model, i);
+    let others = all_but(in_model, Some(i));
+    let fit = |r: &&Hypothesis| r.candidate == effect.candidate || !search.repeats(r, &others);
+    let hypotheses: Vec<Hypothesis> =
+        hypotheses.iter().filter(fit).map(|r| search.tempered(r, left.overdispersion)).collect();
+    let own =
+        hypotheses.iter().find(|r| r.candidate == effect.candidate).filter(|r| r.weight > TOLD).cloned()?;
     let is_plain = search.commonness[own.candidate] == 0.0 && shares.shapes < PLAIN * total;
     // A shape that is little beside all may be much beside this one.
     let in_shape = shares.shapes < PLAIN * 2.0 * own.score.gain;
-    let rivals = if in_shape { rivals } else { levelled(search, &own, rivals) };
-    let odds = odds(search, &rivals, &own, left.heat.max(search.heat), is_plain);
-    let own_odds = odds.iter().find(|o| o.rival.candidate == own.candidate).map_or(0.0, |o| o.probability);
-    let is_alike =
-        |o: &&Odds| o.probability >= ALIAS * own_odds || search.is_form(o.rival.candidate, own.candidate);
+    let hypotheses = if in_shape { hypotheses } else { levelled(search, &own, hypotheses) };
+    let odds = odds(search, &hypotheses, &own, left.overdispersion.max(search.overdispersion), is_plain);
+    let own_odds =
+        odds.iter().find(|o| o.hypothesis.candidate == own.candidate).map_or(0.0, |o| o.probability);
+    let is_alike = |o: &&Odds| {
+        o.probability >= ALIAS * own_odds || search.is_form(o.hypothesis.candidate, own.candidate)
+    };
     let alike = odds.iter().filter(is_alike).map(|o| o.probability);
     let probability = alike.sum::<f64>().min(1.0) * trust(shares.shapes / total, 2.0 * own.weight);
     let candidate = &search.candidates[effect.candidate];
     let family = &library.families()[candidate.family];
-    let mut solved = model.effect(search, active, i, shares.departure());
+    let mut solved = model.effect(search, in_model, i, shares.departure());
     let mut parameters = effect.score.parameters.clone();
     let jumps = |p: &usize| !candidate.parameters[*p].smooth && !candidate.parameters[*p].whole;
     for p in (0..parameters.len()).filter(jumps) {
-        let Some((middle, deviation)) = Model::jumping(search, active, i, p) else { continue };
+        let Some((middle, deviation)) = Model::jumping(search, in_model, i, p) else { continue };
         parameters[p] = middle;
         let own = solved.coefficients.len() + p;
         solved.covariance[own][own] = deviation * deviation;

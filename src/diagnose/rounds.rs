@@ -3,16 +3,16 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use super::bent;
 use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
 use super::folds;
-use super::late::{self, late};
+use super::lag::{self, late};
 use super::linear::{Linear, linear};
 use super::noise::{self, Noise};
+use super::relinearised;
 use super::report;
 use super::score::Rows;
-use super::search::{Active, Search};
+use super::search::{ModelTerm, Search};
 use super::speeds::less_rare;
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Library, RecordingFacts};
@@ -73,7 +73,7 @@ impl Case<'_> {
         let most_wild = if facts_are_smooth(facts) { WILD } else { 1.0 };
         // What is left is noise, once everything else is modelled: the noise is judged anew from it.
         let mut noise = noise_of(&linear, &linear.residual, &runs, &out, facts);
-        let mut active: Vec<Active> = Vec::new();
+        let mut in_model: Vec<ModelTerm> = Vec::new();
         let (mut round, mut moves, mut forgot) = (1, 0, false);
         loop {
             let rows =
@@ -86,47 +86,49 @@ impl Case<'_> {
                 priors: priors.clone(),
                 commonness: commonness.clone(),
                 progress,
-                heat: 1.0,
+                overdispersion: 1.0,
                 in_motion: facts_are_smooth(facts),
                 known: RefCell::default(),
                 grounds: RefCell::default(),
             };
-            let judge = |active: &[Active]| {
-                noise_of(&linear, &report::residual_of(&search, active), &runs, &out, facts)
+            let judge = |in_model: &[ModelTerm]| {
+                noise_of(&linear, &report::residual_of(&search, in_model), &runs, &out, facts)
             };
             let is_settled = |judged: &[Noise]| noise.iter().zip(judged).all(|(a, b)| a.is_close(b));
-            active = search.run(&active, |active| round == NOISE_ROUNDS || is_settled(&judge(active)));
-            active = less_rare(&search, active);
+            in_model =
+                search.run(&in_model, |in_model| round == NOISE_ROUNDS || is_settled(&judge(in_model)));
+            in_model = less_rare(&search, in_model);
             if !search.in_motion && round < NOISE_ROUNDS {
                 // What was found hid how far single positions are off; a slip there and back again is one that is.
-                let lasting = |effect: &&Active| !search.is_event(effect.candidate);
-                let lasting: Vec<Active> = active.iter().filter(lasting).cloned().collect();
+                let lasting = |effect: &&ModelTerm| !search.is_event(effect.candidate);
+                let lasting: Vec<ModelTerm> = in_model.iter().filter(lasting).cloned().collect();
                 let off =
                     noise::outliers_again(&out, &linear, &report::residual_of(&search, &lasting), &runs);
                 if !lasting.is_empty() && off != out {
-                    noise = noise_of(&linear, &report::residual_of(&search, &active), &runs, &off, facts);
-                    (out, active, round) = (off, lasting, round + 1);
+                    noise = noise_of(&linear, &report::residual_of(&search, &in_model), &runs, &off, facts);
+                    (out, in_model, round) = (off, lasting, round + 1);
                     continue;
                 }
             }
-            let judged = judge(&active);
-            let report = |search: &Search, active: &[Active]| -> Told {
-                let diagnosis = report::report(search, active, machine, library, &noise);
-                Told { diagnosis, may_be_late: late::may_be_late(search, active) }
+            let judged = judge(&in_model);
+            let report = |search: &Search, in_model: &[ModelTerm]| -> Told {
+                let diagnosis = report::report(search, in_model, machine, library, &noise);
+                Told { diagnosis, may_be_late: lag::may_be_late(search, in_model) }
             };
-            if moves < MOVES && !active.is_empty() {
-                if let Some(late) = late(&search, &active, plain) {
+            if moves < MOVES && !in_model.is_empty() {
+                if let Some(late) = late(&search, &in_model, plain) {
                     (candidates, noise, moves) = (late, judged, moves + 1);
                     coarse = Coarse::new(&linear, candidates.len());
                     continue;
                 }
-                let moved = bent::straightened(&search, &active, machine, recordings, &facts.dead_bands)?;
+                let moved =
+                    relinearised::straightened(&search, &in_model, machine, recordings, &facts.dead_bands)?;
                 if let Some(moved) = moved {
                     (linear, noise, moves) = (moved, judged, moves + 1);
                     continue;
                 }
             }
-            if active.is_empty() && !forgot && noise.iter().any(Noise::is_long) {
+            if in_model.is_empty() && !forgot && noise.iter().any(Noise::is_long) {
                 // So long a memory may be a misfit that was taken for noise.
                 let left = search.leftover(&search.base);
                 if left.beyond > BEYOND_NOISE {
@@ -135,27 +137,31 @@ impl Case<'_> {
                 }
             }
             if round == NOISE_ROUNDS || is_settled(&judged) {
-                let heat = search.leftover(&search.beside(&active, None)).heat;
-                if heat < HOT {
-                    let found = search.unfolded(search.or_without_the_first(active), most_wild);
+                let overdispersion = search.leftover(&search.beside(&in_model, None)).overdispersion;
+                if overdispersion < HOT {
+                    let found = search.unfolded(search.or_without_the_first(in_model), most_wild);
                     let found = search.moved_together(less_rare(&search, found));
-                    let active = search.polished(&folds::useful(&search, &found, most_wild));
-                    return Ok(report(&search, &active));
+                    let in_model = search.polished(&folds::useful(&search, &found, most_wild));
+                    return Ok(report(&search, &in_model));
                 }
                 // Much is left, as it always is on real machines: the simplest names that stand out from it count.
-                let search =
-                    Search { heat, known: RefCell::default(), grounds: RefCell::default(), ..search };
-                let found = less_rare(&search, search.unfolded(search.run(&active, |_| true), most_wild));
+                let search = Search {
+                    overdispersion,
+                    known: RefCell::default(),
+                    grounds: RefCell::default(),
+                    ..search
+                };
+                let found = less_rare(&search, search.unfolded(search.run(&in_model, |_| true), most_wild));
                 let found = search.moved_together(found);
-                active = search.polished(&folds::useful(&search, &found, most_wild));
+                in_model = search.polished(&folds::useful(&search, &found, most_wild));
                 if moves < MOVES
-                    && let Some(late) = late(&search, &active, plain)
+                    && let Some(late) = late(&search, &in_model, plain)
                 {
                     (candidates, moves) = (late, moves + 1);
                     coarse = Coarse::new(&linear, candidates.len());
                     continue;
                 }
-                return Ok(report(&search, &active));
+                return Ok(report(&search, &in_model));
             }
             (noise, round) = (judged, round + 1);
         }

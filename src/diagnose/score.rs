@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 use super::coarse::{Coarse, Features};
 use super::evidence::{Worth, evidence, log_mean_exp, rarity, sizes_up_to};
 use super::linear::Linear;
-use super::space::Space;
+use super::marginal::Marginal;
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Coefficient};
 use crate::feature::Dimension;
@@ -30,13 +30,13 @@ pub(super) struct Rows<'a> {
     pub(super) energies: Mutex<HashMap<(usize, usize, Key), Column>>,
 }
 
-/// What all candidates are judged against: the space, and the residuals beside it, fine and coarse.
+/// What all candidates are judged against: the marginal, and the residuals beside it, fine and coarse.
 pub(super) struct Field {
-    pub space: Arc<Space>,
+    pub marginal: Arc<Marginal>,
     /// `M r`.
     pub left: DVector<f64>,
-    /// Space and residuals on the blocks of each level, once they have been asked for.
-    pub(super) coarse: Vec<OnceLock<(Space, DVector<f64>)>>,
+    /// Marginal and residuals on the blocks of each level, once they have been asked for.
+    pub(super) coarse: Vec<OnceLock<(Marginal, DVector<f64>)>>,
 }
 
 /// A column that several candidates share.
@@ -45,9 +45,9 @@ pub(super) type Column = Arc<Vec<f64>>;
 /// What is done with a point's normal equations.
 type Take<'a> = dyn FnMut(usize, &Equations) + 'a;
 
-/// Normal equations of columns beside a space.
+/// Normal equations of columns beside a marginal.
 pub(super) struct Equations {
-    /// Gram matrix of what the space leaves of the columns.
+    /// Gram matrix of what the marginal leaves of the columns.
     pub gram: DMatrix<f64>,
     /// The columns times the residuals.
     pub toward: DVector<f64>,
@@ -64,7 +64,7 @@ pub(super) struct Wave {
 }
 
 impl Equations {
-    /// `along`: what the space takes of the columns.
+    /// `along`: what the marginal takes of the columns.
     pub fn of(columns: &DMatrixView<f64>, along: &DMatrixView<f64>, toward: DVector<f64>) -> Self {
         let (own, taken) = match columns.ncols() > WIDE {
             true => (columns.transpose() * columns, along.transpose() * along),
@@ -73,7 +73,7 @@ impl Equations {
         Equations { whole: own.diagonal(), gram: own - taken, toward }
     }
 
-    /// Whether the space leaves next to nothing of one of the first columns, so that what is put together in blocks does not tell it.
+    /// Whether the marginal leaves next to nothing of one of the first columns, so that what is put together in blocks does not tell it.
     fn is_faint(&self, columns: usize) -> bool {
         (0..columns).any(|c| self.gram[(c, c)] < BARELY * self.whole[c])
     }
@@ -125,19 +125,19 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// What candidates are judged against beside a space.
-    pub fn field(&self, space: impl Into<Arc<Space>>) -> Field {
-        let space = space.into();
-        let left = space.apply(&self.residual);
+    /// What candidates are judged against beside a marginal.
+    pub fn field(&self, marginal: impl Into<Arc<Marginal>>) -> Field {
+        let marginal = marginal.into();
+        let left = marginal.apply(&self.residual);
         let coarse = self.coarse.levels().iter().map(|_| OnceLock::new()).collect();
-        Field { space, left, coarse }
+        Field { marginal, left, coarse }
     }
 
     /// Everything constant, marginalised.
-    pub fn constant(&self) -> Space {
+    pub fn constant(&self) -> Marginal {
         let mut columns = self.linear.constant.clone();
         self.whiten(&mut columns);
-        Space::new(columns)
+        Marginal::new(columns)
     }
 
     pub fn whiten(&self, columns: &mut DMatrix<f64>) {
@@ -255,8 +255,14 @@ impl<'a> Rows<'a> {
         rarity(sizes_up_to(size), usual)
     }
 
-    /// The best of candidate `i` over its grid, on blocks where that does. `heat`: by how much chance is larger than the noise says.
-    pub fn screen(&self, i: usize, candidate: &Candidate, field: &Field, heat: f64) -> Option<Score> {
+    /// The best of candidate `i` over its grid, on blocks where that does. `overdispersion`: by how much chance is larger than the noise says.
+    pub fn screen(
+        &self,
+        i: usize,
+        candidate: &Candidate,
+        field: &Field,
+        overdispersion: f64,
+    ) -> Option<Score> {
         let lengths = lengths(candidate);
         let all: Vec<usize> = (0..candidate.grid.len()).collect();
         let mut table: Vec<Option<Best>> = vec![None; all.len()];
@@ -269,14 +275,14 @@ impl<'a> Rows<'a> {
             // Far from a line there is next to nothing: evidence of no gain.
             let none = -(candidate.coefficients.len() as f64);
             let peaks = peaks(&gains);
-            self.table(candidate, &candidate.grid, field, None, heat, &peaks, &mut table);
-            // What waves have in common with the space, and sizes that are not usual, take as much from those that are not looked at.
+            self.table(candidate, &candidate.grid, field, None, overdispersion, &peaks, &mut table);
+            // What waves have in common with the marginal, and sizes that are not usual, take as much from those that are not looked at.
             let exact = peaks.iter().filter_map(|i| Some(table[*i].as_ref()?.gain));
             let rough = peaks.iter().map(|i| 0.5 * gains[*i]).fold(0.0, f64::max);
             let part = (exact.fold(0.0, f64::max) / rough.max(1e-300)).min(1.0);
             for (best, gain) in table.iter_mut().zip(&gains).filter(|(best, _)| best.is_none()) {
                 let gain = 0.5 * part * gain;
-                let evidence = gain / heat + none;
+                let evidence = gain / overdispersion + none;
                 *best = Some(Best { evidence, length: lengths[0], gain, room: ROOM, is_faint: false });
             }
             let mut summary = summary(&candidate.grid, &table, &peaks)?;
@@ -287,7 +293,7 @@ impl<'a> Rows<'a> {
             return Some(summary);
         }
         let kept = self.coarse.features(i, candidate, &self.linear.samples);
-        self.table(candidate, &candidate.grid, field, kept, heat, &all, &mut table);
+        self.table(candidate, &candidate.grid, field, kept, overdispersion, &all, &mut table);
         let mut rough = summary(&candidate.grid, &table, &all)?;
         let halves = candidate.grid.iter().filter(|at| candidate.is_half(at, &rough.parameters)).cloned();
         rough.also = halves.collect();
@@ -308,7 +314,7 @@ impl<'a> Rows<'a> {
             true => peaks(&evidence).into_iter().map(|i| candidate.grid[i].clone()).collect(),
             false => vec![rough.parameters.clone()],
         };
-        let fine = looked_at.iter().filter_map(|at| self.score_at(candidate, at, field, heat));
+        let fine = looked_at.iter().filter_map(|at| self.score_at(candidate, at, field, overdispersion));
         let fine = fine.max_by(|a, b| a.at_best.total_cmp(&b.at_best))?;
         Some(Score { evidence: rough.evidence + fine.at_best - rough.at_best, also: rough.also, ..fine })
     }
@@ -319,11 +325,11 @@ impl<'a> Rows<'a> {
         candidate: &Candidate,
         parameters: &[f64],
         field: &Field,
-        heat: f64,
+        overdispersion: f64,
     ) -> Option<Score> {
         let grid = [parameters.to_vec()];
         let mut table = vec![None];
-        self.table(candidate, &grid, field, None, heat, &[0], &mut table);
+        self.table(candidate, &grid, field, None, overdispersion, &[0], &mut table);
         summary(&grid, &table, &[0])
     }
 
@@ -335,15 +341,15 @@ impl<'a> Rows<'a> {
         grid: &[Vec<f64>],
         field: &Field,
         kept: Option<&(usize, Features)>,
-        heat: f64,
+        overdispersion: f64,
         points: &[usize],
         table: &mut [Option<Best>],
     ) {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
         if let Some((level, kept)) = kept {
-            return self.coarse_table(candidate, grid, field, (*level, kept), heat, points, table);
+            return self.coarse_table(candidate, grid, field, (*level, kept), overdispersion, points, table);
         }
-        let (space, left) = (&*field.space, &field.left);
+        let (marginal, left) = (&*field.marginal, &field.left);
         let usual = self.usual_sizes(candidate, grid);
         for batch in points.chunks((BATCH / (k * left.len()).max(1)).max(1)) {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
@@ -355,23 +361,23 @@ impl<'a> Rows<'a> {
                     built.push(*i);
                 }
             }
-            judge(&joined.columns(0, k * built.len()), space, left, &built, &mut |i, equations| {
-                table[i] = Some(best(candidate, &grid[i], &lengths, equations, heat, usual));
+            judge(&joined.columns(0, k * built.len()), marginal, left, &built, &mut |i, equations| {
+                table[i] = Some(best(candidate, &grid[i], &lengths, equations, overdispersion, usual));
             });
         }
     }
 }
 
-/// Judges columns, as many for each of these points, beside a space.
+/// Judges columns, as many for each of these points, beside a marginal.
 pub(super) fn judge(
     joined: &DMatrixView<f64>,
-    space: &Space,
+    marginal: &Marginal,
     left: &DVector<f64>,
     points: &[usize],
     take: &mut Take,
 ) {
     let k = joined.ncols() / points.len().max(1);
-    let (along, toward) = (space.along(joined), joined.tr_mul(left));
+    let (along, toward) = (marginal.along(joined), joined.tr_mul(left));
     for (b, i) in points.iter().enumerate() {
         let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
         take(*i, &Equations::of(&columns, &own, toward.rows(b * k, k).into_owned()));
@@ -384,12 +390,13 @@ pub(super) fn best(
     at: &[f64],
     lengths: &[usize],
     equations: &Equations,
-    heat: f64,
+    overdispersion: f64,
     usual: usize,
 ) -> Best {
     let lengths = if candidate.has_overtones(at) { lengths } else { &lengths[..1] };
     let Equations { gram, toward, .. } = equations;
-    let all: Vec<Worth> = lengths.iter().map(|length| evidence(gram, toward, *length, heat, usual)).collect();
+    let all: Vec<Worth> =
+        lengths.iter().map(|length| evidence(gram, toward, *length, overdispersion, usual)).collect();
     let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
     let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
     let Worth { gain, size, .. } = all[best];
@@ -405,7 +412,7 @@ pub(super) struct Best {
     length: usize,
     gain: f64,
     room: f64,
-    /// Whether the space leaves next to nothing of one of its columns.
+    /// Whether the marginal leaves next to nothing of one of its columns.
     is_faint: bool,
 }
 
@@ -424,7 +431,7 @@ impl Best {
     }
 }
 
-/// A space that leaves less than this part of a column's square leaves next to nothing of it.
+/// A marginal that leaves less than this part of a column's square leaves next to nothing of it.
 const BARELY: f64 = 1e-2;
 /// More columns than this are multiplied by blocks.
 const WIDE: usize = 5;

@@ -11,15 +11,15 @@ use rayon::prelude::*;
 use super::contained::prefer_simpler;
 use super::folds;
 use super::leftover::{Leftover, measure};
+use super::marginal::Marginal;
 use super::refine::refine;
 use super::score::{Rows, Score};
 use super::shares::Shares;
-use super::space::Space;
 use crate::effects::Candidate;
 
 /// An effect that has been taken in.
 #[derive(Clone)]
-pub(super) struct Active {
+pub(super) struct ModelTerm {
     /// Index of the candidate.
     pub candidate: usize,
     pub score: Score,
@@ -37,7 +37,7 @@ pub(super) struct Active {
     pub hidden: bool,
 }
 
-impl Active {
+impl ModelTerm {
     fn mark(&self) -> Mark {
         let parameters = self.score.parameters.iter().map(|x| x.to_bits()).collect();
         (self.candidate, self.score.coefficients, parameters)
@@ -56,19 +56,19 @@ impl Active {
     }
 
     /// With a shape that is quite the family's.
-    pub(super) fn without_shape(&self) -> Active {
-        Active { shape: DMatrix::zeros(self.columns.nrows(), 0), ..self.clone() }
+    pub(super) fn without_shape(&self) -> ModelTerm {
+        ModelTerm { shape: DMatrix::zeros(self.columns.nrows(), 0), ..self.clone() }
     }
 
     /// In the place of another.
-    pub(super) fn instead_of(self, other: &Active) -> Active {
-        Active { near: other.near.clone(), hidden: other.hidden, ..self }
+    pub(super) fn instead_of(self, other: &ModelTerm) -> ModelTerm {
+        ModelTerm { near: other.near.clone(), hidden: other.hidden, ..self }
     }
 }
 
 /// A candidate that competes for one finding, and its weight.
 #[derive(Clone, Debug)]
-pub(super) struct Rival {
+pub(super) struct Hypothesis {
     pub candidate: usize,
     /// Logarithm of evidence and prior together.
     pub weight: f64,
@@ -77,16 +77,16 @@ pub(super) struct Rival {
     pub reach: f64,
 }
 
-impl Rival {
+impl Hypothesis {
     pub fn new(candidate: usize, weight: f64, score: Score) -> Self {
-        Rival { candidate, weight, reach: score.gain, score }
+        Hypothesis { candidate, weight, reach: score.gain, score }
     }
 }
 
 pub(super) struct Search<'a> {
     pub rows: &'a Rows<'a>,
     pub runs: &'a [Vec<usize>],
-    pub base: Space,
+    pub base: Marginal,
     pub candidates: &'a [Candidate],
     /// Logarithm of what is expected of each candidate beforehand.
     pub priors: Vec<f64>,
@@ -94,20 +94,20 @@ pub(super) struct Search<'a> {
     pub commonness: Vec<f64>,
     pub progress: &'a dyn Fn(&str),
     /// By how much chance counts as larger than the noise says.
-    pub heat: f64,
+    pub overdispersion: f64,
     /// Whether the recordings follow a path; else they are settled positions, of which the side of approach is known.
     pub in_motion: bool,
-    /// Rivals that are known, by what has been taken in besides.
+    /// Hypotheses that are known, by what has been taken in besides.
     pub known: RefCell<Known>,
     /// The last spaces that candidates were judged beside, by what had been taken in, and whether that was by names alone.
-    pub grounds: RefCell<VecDeque<(Ground, Arc<Space>)>>,
+    pub grounds: RefCell<VecDeque<(Ground, Arc<Marginal>)>>,
 }
 
 /// What had been taken in, and whether it stands for its names alone.
 pub(super) type Ground = (Vec<Mark>, bool);
 
-/// Rivals by the effect that stood aside, by those that were taken in, and by whether these stand for their names alone.
-pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>, bool), Rc<Vec<Rival>>>;
+/// Hypotheses by the effect that stood aside, by those that were taken in, and by whether these stand for their names alone.
+pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>, bool), Rc<Vec<Hypothesis>>>;
 
 /// What tells an effect that has been taken in: candidate, coefficients and parameters.
 pub(super) type Mark = (usize, usize, Vec<u64>);
@@ -117,7 +117,7 @@ pub(super) const NEAR: usize = 40;
 /// Candidates with this part of the best one's weight come into question, and at most so many.
 const CLOSE: f64 = 0.6;
 const REFINED: usize = 8;
-/// Effects of more energy (half of it) than this show their shape; of rivals with this part of the best one's, so many are looked at.
+/// Effects of more energy (half of it) than this show their shape; of hypotheses with this part of the best one's, so many are looked at.
 pub(super) const LARGE: f64 = 300.0;
 const SIMILAR: f64 = 0.8;
 const SHAPED: usize = 8;
@@ -145,99 +145,107 @@ const MOST_IN_MOTION: usize = 5;
 pub(super) const ENTER: f64 = 8.0;
 
 impl Search<'_> {
-    /// Evidence of every candidate beside the active effects, better first.
-    pub fn rivals(&self, active: &[Active]) -> Rc<Vec<Rival>> {
-        self.known_or(active, None, None)
+    /// Evidence of every candidate beside the effects in the model, better first.
+    pub fn hypotheses(&self, in_model: &[ModelTerm]) -> Rc<Vec<Hypothesis>> {
+        self.known_or(in_model, None, None)
     }
 
     /// Evidence of those that might take the place of effect `i`, beside all others.
-    pub fn rivals_of(&self, active: &[Active], i: usize) -> Rc<Vec<Rival>> {
-        self.known_or(active, Some(i), Some(&active[i].near))
+    pub fn rivals_of(&self, in_model: &[ModelTerm], i: usize) -> Rc<Vec<Hypothesis>> {
+        self.known_or(in_model, Some(i), Some(&in_model[i].near))
     }
 
-    fn known_or(&self, active: &[Active], but: Option<usize>, among: Option<&[usize]>) -> Rc<Vec<Rival>> {
-        let others = active.iter().enumerate().filter(|(i, _)| Some(*i) != but);
+    fn known_or(
+        &self,
+        in_model: &[ModelTerm],
+        but: Option<usize>,
+        among: Option<&[usize]>,
+    ) -> Rc<Vec<Hypothesis>> {
+        let others = in_model.iter().enumerate().filter(|(i, _)| Some(*i) != but);
         let mut marks: Vec<Mark> = others.map(|(_, effect)| effect.mark()).collect();
         marks.sort();
-        let (of, hidden) = (but.map(|i| active[i].candidate), but.is_some_and(|i| active[i].hidden));
+        let (of, hidden) = (but.map(|i| in_model[i].candidate), but.is_some_and(|i| in_model[i].hidden));
         let mut known = self.known.borrow_mut();
         let key = |of: Option<usize>| (of, marks.clone(), hidden);
         if let Some(known) = known.get(&key(None)).or_else(|| known.get(&key(of))) {
             return known.clone();
         }
-        let rivals = Rc::new(self.compare(self.ground(active, but), among));
-        known.insert(key(among.and(of)), rivals.clone());
-        rivals
+        let hypotheses = Rc::new(self.compare(self.ground(in_model, but), among));
+        known.insert(key(among.and(of)), hypotheses.clone());
+        hypotheses
     }
 
-    pub(super) fn compare(&self, space: Arc<Space>, among: Option<&[usize]>) -> Vec<Rival> {
-        let field = self.rows.field(space);
+    pub(super) fn compare(&self, marginal: Arc<Marginal>, among: Option<&[usize]>) -> Vec<Hypothesis> {
+        let field = self.rows.field(marginal);
         // What progress is told is no matter of the threads.
-        let (rows, priors, candidates, heat) = (self.rows, &self.priors, self.candidates, self.heat);
+        let (rows, priors, candidates, overdispersion) =
+            (self.rows, &self.priors, self.candidates, self.overdispersion);
         let all: Vec<usize> = among.map_or_else(|| (0..candidates.len()).collect(), <[usize]>::to_vec);
-        let mut rivals: Vec<Rival> = (all.into_par_iter())
+        let mut hypotheses: Vec<Hypothesis> = (all.into_par_iter())
             .filter_map(|i| {
-                let score = rows.screen(i, &candidates[i], &field, heat)?;
-                Some(Rival::new(i, score.evidence + priors[i], score))
+                let score = rows.screen(i, &candidates[i], &field, overdispersion)?;
+                Some(Hypothesis::new(i, score.evidence + priors[i], score))
             })
             .collect();
-        let better_first = |a: &Rival, b: &Rival| b.weight.total_cmp(&a.weight);
-        rivals.sort_by(better_first);
-        self.bring_up(&mut rivals, &field);
+        let better_first = |a: &Hypothesis, b: &Hypothesis| b.weight.total_cmp(&a.weight);
+        hypotheses.sort_by(better_first);
+        self.bring_up(&mut hypotheses, &field);
         // Between the points of its grid a candidate may be much better: those that come into question are refined.
-        let near = rivals.iter().map(|r| r.weight).fold(0.0, f64::max) * CLOSE;
-        let is_close = |r: &Rival| r.weight > 0.0 && (r.weight >= near || r.reach > r.score.gain);
-        let close = rivals.iter().take_while(|r| is_close(r)).count().min(REFINED);
-        let refined: Vec<Rival> = rivals[..close]
+        let near = hypotheses.iter().map(|r| r.weight).fold(0.0, f64::max) * CLOSE;
+        let is_close = |r: &Hypothesis| r.weight > 0.0 && (r.weight >= near || r.reach > r.score.gain);
+        let close = hypotheses.iter().take_while(|r| is_close(r)).count().min(REFINED);
+        let refined: Vec<Hypothesis> = hypotheses[..close]
             .par_iter()
-            .map(|r| refine(rows, &candidates[r.candidate], r, &field, heat))
+            .map(|r| refine(rows, &candidates[r.candidate], r, &field, overdispersion))
             .collect();
-        rivals.splice(..close, refined);
-        rivals[..close].sort_by(better_first);
+        hypotheses.splice(..close, refined);
+        hypotheses[..close].sort_by(better_first);
         // No play is quite a step: what explains nearly as much may do so better once its shape may depart a little from the family's.
-        let most = rivals[..close].iter().map(|r| r.reach / heat).fold(0.0, f64::max);
+        let most = hypotheses[..close].iter().map(|r| r.reach / overdispersion).fold(0.0, f64::max);
         if most > LARGE && rows.whitener.count() > MANY {
-            let alike: Vec<usize> =
-                (0..close).filter(|i| rivals[*i].reach / heat > SIMILAR * most).take(SHAPED).collect();
+            let alike: Vec<usize> = (0..close)
+                .filter(|i| hypotheses[*i].reach / overdispersion > SIMILAR * most)
+                .take(SHAPED)
+                .collect();
             for i in alike {
-                rivals[i].weight = self.with_shape(&rivals[i], &field);
+                hypotheses[i].weight = self.with_shape(&hypotheses[i], &field);
             }
-            let slack = (UNKNOWN_SHAPE * most).min(VISIBLE * rows.whitener.count() as f64 / heat);
-            for rival in &mut rivals[..close] {
-                let bent = ((most - rival.reach / heat) / (BENT * most)).clamp(0.0, 1.0);
-                rival.weight += slack * (self.commonness[rival.candidate] - bent);
+            let slack = (UNKNOWN_SHAPE * most).min(VISIBLE * rows.whitener.count() as f64 / overdispersion);
+            for hypothesis in &mut hypotheses[..close] {
+                let bent = ((most - hypothesis.reach / overdispersion) / (BENT * most)).clamp(0.0, 1.0);
+                hypothesis.weight += slack * (self.commonness[hypothesis.candidate] - bent);
             }
-            rivals.sort_by(better_first);
+            hypotheses.sort_by(better_first);
         }
-        prefer_simpler(self, &mut rivals, close, &field.space);
-        rivals.sort_by(better_first);
-        rivals
+        prefer_simpler(self, &mut hypotheses, close, &field.marginal);
+        hypotheses.sort_by(better_first);
+        hypotheses
     }
 
-    /// A rival where chance is larger than what it was searched with.
-    pub fn tempered(&self, rival: &Rival, heat: f64) -> Rival {
-        let heat = (heat / self.heat).max(1.0);
-        let prior = self.priors[rival.candidate];
-        Rival { weight: prior + (rival.weight - prior) / heat, ..rival.clone() }
+    /// A hypothesis where chance is larger than what it was searched with.
+    pub fn tempered(&self, hypothesis: &Hypothesis, overdispersion: f64) -> Hypothesis {
+        let overdispersion = (overdispersion / self.overdispersion).max(1.0);
+        let prior = self.priors[hypothesis.candidate];
+        Hypothesis { weight: prior + (hypothesis.weight - prior) / overdispersion, ..hypothesis.clone() }
     }
 
-    /// The space beside all active effects but one.
-    pub fn beside(&self, active: &[Active], but: Option<usize>) -> Space {
-        let others = active.iter().enumerate().filter(|(i, _)| Some(*i) != but);
+    /// The marginal beside all effects in the model but one.
+    pub fn beside(&self, in_model: &[ModelTerm], but: Option<usize>) -> Marginal {
+        let others = in_model.iter().enumerate().filter(|(i, _)| Some(*i) != but);
         let parts: Vec<&DMatrix<f64>> = others.flat_map(|(_, e)| [&e.columns, &e.state, &e.shape]).collect();
         self.base.with(&side_by_side(&parts, self.rows.residual.len()))
     }
 
-    /// The space beside all active effects but one, their shapes as the families' where they would depart too far: what is hidden there
+    /// The marginal beside all effects in the model but one, their shapes as the families' where they would depart too far: what is hidden there
     /// is another effect, or unexplained.
-    pub(super) fn ground(&self, active: &[Active], but: Option<usize>) -> Arc<Space> {
-        let others = all_but(active, but);
-        let hidden = but.is_some_and(|i| active[i].hidden);
-        let marks = (others.iter().map(Active::mark).collect(), hidden);
+    pub(super) fn ground(&self, in_model: &[ModelTerm], but: Option<usize>) -> Arc<Marginal> {
+        let others = all_but(in_model, but);
+        let hidden = but.is_some_and(|i| in_model[i].hidden);
+        let marks = (others.iter().map(ModelTerm::mark).collect(), hidden);
         if let Some((_, known)) = self.grounds.borrow().iter().find(|(of, _)| *of == marks) {
             return known.clone();
         }
-        let is_misshapen = |others: &[Active]| self.shares(others).is_misshapen(others.len());
+        let is_misshapen = |others: &[ModelTerm]| self.shares(others).is_misshapen(others.len());
         let ground = Arc::new(match hidden || !others.is_empty() && is_misshapen(&others) {
             true => self.beside_names(&others),
             false => self.beside(&others, None),
@@ -248,23 +256,23 @@ impl Search<'_> {
         ground
     }
 
-    /// The space beside the names alone, as if their shapes were the families'.
-    pub fn beside_names(&self, active: &[Active]) -> Space {
-        let parts: Vec<&DMatrix<f64>> = active.iter().flat_map(|e| [&e.columns, &e.state]).collect();
+    /// The marginal beside the names alone, as if their shapes were the families'.
+    pub fn beside_names(&self, in_model: &[ModelTerm]) -> Marginal {
+        let parts: Vec<&DMatrix<f64>> = in_model.iter().flat_map(|e| [&e.columns, &e.state]).collect();
         self.base.with(&side_by_side(&parts, self.rows.residual.len()))
     }
 
-    /// Logarithm of the evidence of all active effects together, with what they were before and their shapes.
-    pub fn worth(&self, active: &[Active]) -> f64 {
+    /// Logarithm of the evidence of all effects in the model together, with what they were before and their shapes.
+    pub fn worth(&self, in_model: &[ModelTerm]) -> f64 {
         let parts: Vec<&DMatrix<f64>> =
-            active.iter().flat_map(|e| [&e.columns, &e.state, &e.shape]).collect();
+            in_model.iter().flat_map(|e| [&e.columns, &e.state, &e.shape]).collect();
         let left = self.base.apply(&self.rows.residual);
-        self.base.worth(&side_by_side(&parts, left.len()), &left, self.heat)
+        self.base.worth(&side_by_side(&parts, left.len()), &left, self.overdispersion)
     }
 
-    /// What is left beside the active effects.
-    pub fn leftover(&self, space: &Space) -> Leftover {
-        let left = space.apply(&self.rows.residual);
+    /// What is left beside the effects in the model.
+    pub fn leftover(&self, marginal: &Marginal) -> Leftover {
+        let left = marginal.apply(&self.rows.residual);
         measure(left.as_slice(), self.runs, &self.rows.whitener.out)
     }
 
@@ -276,41 +284,44 @@ impl Search<'_> {
     /// `from`: what had been found under another noise. `holds`: whether the noise is still what it is searched with; where nothing had been
     /// found and the first effect changes it, everything else is left to the search with the noise that is left. Among settled positions noise
     /// is what is left, and less of it with every effect: there all are judged by the same.
-    pub fn run(&self, from: &[Active], holds: impl Fn(&[Active]) -> bool) -> Vec<Active> {
-        let mut active: Vec<Active> = Vec::new();
+    pub fn run(&self, from: &[ModelTerm], holds: impl Fn(&[ModelTerm]) -> bool) -> Vec<ModelTerm> {
+        let mut in_model: Vec<ModelTerm> = Vec::new();
         for effect in from {
-            let space = self.beside(&active, None);
+            let marginal = self.beside(&in_model, None);
             let (rows, candidate) = (self.rows, &self.candidates[effect.candidate]);
-            let Some(score) =
-                rows.score_at(candidate, &effect.score.parameters, &rows.field(space.clone()), self.heat)
-            else {
+            let Some(score) = rows.score_at(
+                candidate,
+                &effect.score.parameters,
+                &rows.field(marginal.clone()),
+                self.overdispersion,
+            ) else {
                 continue;
             };
-            let rival = Rival::new(effect.candidate, score.evidence, score);
-            active.extend(self.enter(&rival, &space).map(|again| again.instead_of(effect)));
+            let hypothesis = Hypothesis::new(effect.candidate, score.evidence, score);
+            in_model.extend(self.enter(&hypothesis, &marginal).map(|again| again.instead_of(effect)));
         }
-        self.swap(&mut active);
+        self.swap(&mut in_model);
         let mut tried: HashSet<Vec<usize>> = HashSet::new();
-        let (mut sound, mut harmful) = (active.clone(), 0);
-        while active.len() < self.most() {
+        let (mut sound, mut harmful) = (in_model.clone(), 0);
+        while in_model.len() < self.most() {
             // Swaps may throw out what the next step takes in again.
-            if !tried.insert(active.iter().map(|effect| effect.candidate).collect()) {
+            if !tried.insert(in_model.iter().map(|effect| effect.candidate).collect()) {
                 break;
             }
-            (self.progress)(&format!("looking for effect {}", active.len() + 1));
-            let Some(entered) = self.next(&active) else { break };
-            active.push(entered);
-            if self.in_motion && from.is_empty() && active.len() == 1 && !holds(&active) {
-                return active;
+            (self.progress)(&format!("looking for effect {}", in_model.len() + 1));
+            let Some(entered) = self.next(&in_model) else { break };
+            in_model.push(entered);
+            if self.in_motion && from.is_empty() && in_model.len() == 1 && !holds(&in_model) {
+                return in_model;
             }
-            if active.len() > 1 {
-                self.swap(&mut active);
+            if in_model.len() > 1 {
+                self.swap(&mut in_model);
             }
             // A name that makes stretches worse that were left out is a patch, unless the next one mends it.
-            let is_patched = self.rows.whitener.count() > MANY && folds::harmful(self, &active).is_some();
+            let is_patched = self.rows.whitener.count() > MANY && folds::harmful(self, &in_model).is_some();
             harmful = if is_patched { harmful + 1 } else { 0 };
             match harmful {
-                0 => sound.clone_from(&active),
+                0 => sound.clone_from(&in_model),
                 1 => {}
                 _ => break,
             }
@@ -325,82 +336,97 @@ impl Search<'_> {
     }
 
     /// The effect to be taken in next: what stands out beside those found, else what was taken for their shape.
-    fn next(&self, active: &[Active]) -> Option<Active> {
-        let shares = self.shares(active);
-        if shares.is_misshapen(active.len()) {
-            return self.hidden(active, &self.rivals(active), &shares);
+    fn next(&self, in_model: &[ModelTerm]) -> Option<ModelTerm> {
+        let shares = self.shares(in_model);
+        if shares.is_misshapen(in_model.len()) {
+            return self.hidden(in_model, &self.hypotheses(in_model), &shares);
         }
-        self.beyond(active).or_else(|| {
+        self.beyond(in_model).or_else(|| {
             let is_odd = shares.shapes > ODD * shares.total();
-            let ground = || Arc::new(self.beside_names(active));
-            is_odd.then(|| self.hidden(active, &self.compare(ground(), None), &shares)).flatten()
+            let ground = || Arc::new(self.beside_names(in_model));
+            is_odd.then(|| self.hidden(in_model, &self.compare(ground(), None), &shares)).flatten()
         })
     }
 
     /// The effect that stands out beside those found and their shapes.
-    fn beyond(&self, active: &[Active]) -> Option<Active> {
-        let (rivals, space) = (self.rivals(active), self.ground(active, None));
-        let before = self.leftover(&space);
-        let best = self.best(&rivals, active, &before)?;
+    fn beyond(&self, in_model: &[ModelTerm]) -> Option<ModelTerm> {
+        let (hypotheses, marginal) = (self.hypotheses(in_model), self.ground(in_model, None));
+        let before = self.leftover(&marginal);
+        let best = self.best(&hypotheses, in_model, &before)?;
         let least = if self.in_motion { WORTH } else { WORTH_SETTLED } * before.energy;
-        if best.score.gain < self.shape_error(best, active) || 2.0 * best.score.gain < least {
+        if best.score.gain < self.shape_error(best, in_model) || 2.0 * best.score.gain < least {
             return None;
         }
-        self.entered(best, &rivals, &space)
+        self.entered(best, &hypotheses, &marginal)
     }
 
-    /// The effect that takes most of what was taken for the shape of those found; `rivals`: beside their names alone.
-    fn hidden(&self, active: &[Active], rivals: &[Rival], shares: &Shares) -> Option<Active> {
-        let space = Arc::new(self.beside_names(active));
-        let best = self.best(rivals, active, &self.leftover(&space))?;
+    /// The effect that takes most of what was taken for the shape of those found; `hypotheses`: beside their names alone.
+    fn hidden(
+        &self,
+        in_model: &[ModelTerm],
+        hypotheses: &[Hypothesis],
+        shares: &Shares,
+    ) -> Option<ModelTerm> {
+        let marginal = Arc::new(self.beside_names(in_model));
+        let best = self.best(hypotheses, in_model, &self.leftover(&marginal))?;
         let is_most = 2.0 * best.score.gain >= HIDDEN * shares.shapes;
-        let is_own = best.score.gain < self.shape_error(best, active) || self.is_of_course(best, active);
-        let entered = (is_most && !is_own).then(|| self.entered(best, rivals, &space)).flatten();
-        entered.map(|effect| Active { hidden: true, ..effect })
+        let is_own = best.score.gain < self.shape_error(best, in_model) || self.is_of_course(best, in_model);
+        let entered = (is_most && !is_own).then(|| self.entered(best, hypotheses, &marginal)).flatten();
+        entered.map(|effect| ModelTerm { hidden: true, ..effect })
     }
 
-    /// The best rival that is neither chance nor what was found already.
-    fn best<'r>(&self, rivals: &'r [Rival], active: &[Active], before: &Leftover) -> Option<&'r Rival> {
+    /// The best hypothesis that is neither chance nor what was found already.
+    fn best<'r>(
+        &self,
+        hypotheses: &'r [Hypothesis],
+        in_model: &[ModelTerm],
+        before: &Leftover,
+    ) -> Option<&'r Hypothesis> {
         let is_chance =
-            |r: &Rival| r.weight <= ENTER * if self.is_tone(r.candidate) { before.band } else { 1.0 };
-        let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
-        worthy.find(|r| !is_chance(r) && !self.repeats(r, active))
+            |r: &Hypothesis| r.weight <= ENTER * if self.is_tone(r.candidate) { before.band } else { 1.0 };
+        let mut worthy = hypotheses.iter().take_while(|r| r.weight > ENTER);
+        worthy.find(|r| !is_chance(r) && !self.repeats(r, in_model))
     }
 
-    /// A rival taken in, if its evidence stands out from the structure that it leaves.
-    fn entered(&self, best: &Rival, rivals: &[Rival], space: &Arc<Space>) -> Option<Active> {
-        let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
-        let entered = Active { near, ..self.settle(best, space)? };
-        let left = self.leftover(&space.with(&entered.columns).with(&entered.state).with(&entered.shape));
-        (best.weight >= ENTER * (left.heat / self.heat).max(1.0)).then_some(entered)
+    /// A hypothesis taken in, if its evidence stands out from the structure that it leaves.
+    fn entered(
+        &self,
+        best: &Hypothesis,
+        hypotheses: &[Hypothesis],
+        marginal: &Arc<Marginal>,
+    ) -> Option<ModelTerm> {
+        let near = hypotheses.iter().take(NEAR).map(|r| r.candidate).collect();
+        let entered = ModelTerm { near, ..self.settle(best, marginal)? };
+        let left = self.leftover(&marginal.with(&entered.columns).with(&entered.state).with(&entered.shape));
+        (best.weight >= ENTER * (left.overdispersion / self.overdispersion).max(1.0)).then_some(entered)
     }
 
     /// Every effect gives its place to a better one, beside the others; one that is no longer needed goes.
-    fn swap(&self, active: &mut Vec<Active>) {
+    fn swap(&self, in_model: &mut Vec<ModelTerm>) {
         for _ in 0..2 {
             let mut changed = false;
             let mut i = 0;
-            while i < active.len() {
-                let rivals = self.rivals_of(active, i);
-                let others = all_but(active, Some(i));
-                let mut worthy = rivals.iter().take_while(|r| r.weight > ENTER);
+            while i < in_model.len() {
+                let hypotheses = self.rivals_of(in_model, i);
+                let others = all_but(in_model, Some(i));
+                let mut worthy = hypotheses.iter().take_while(|r| r.weight > ENTER);
                 let Some(best) = worthy.find(|r| !self.repeats(r, &others)) else {
-                    active.remove(i);
+                    in_model.remove(i);
                     changed = true;
                     continue;
                 };
                 // What it was worth when it was taken in counts no longer: the others have changed.
-                let ground = self.ground(active, Some(i));
-                let own = &active[i];
+                let ground = self.ground(in_model, Some(i));
+                let own = &in_model[i];
                 let candidate = &self.candidates[own.candidate];
                 let field = self.rows.field(ground.clone());
-                let now = self.rows.score_at(candidate, &own.score.parameters, &field, self.heat);
+                let now = self.rows.score_at(candidate, &own.score.parameters, &field, self.overdispersion);
                 let now =
                     now.filter(|now| best.candidate == own.candidate && best.score.gain <= now.gain + 0.5);
                 changed |= now.is_none();
-                let rival = now.map(|score| Rival::new(own.candidate, best.weight, score));
-                if let Some(entered) = self.settle(rival.as_ref().unwrap_or(best), &ground) {
-                    active[i] = entered.instead_of(&active[i]);
+                let hypothesis = now.map(|score| Hypothesis::new(own.candidate, best.weight, score));
+                if let Some(entered) = self.settle(hypothesis.as_ref().unwrap_or(best), &ground) {
+                    in_model[i] = entered.instead_of(&in_model[i]);
                 }
                 i += 1;
             }
@@ -423,6 +449,6 @@ pub(super) fn side_by_side(parts: &[&DMatrix<f64>], rows: usize) -> DMatrix<f64>
 }
 
 /// All effects but one.
-pub(super) fn all_but(active: &[Active], but: Option<usize>) -> Vec<Active> {
-    active.iter().enumerate().filter(|(i, _)| Some(*i) != but).map(|(_, effect)| effect.clone()).collect()
+pub(super) fn all_but(in_model: &[ModelTerm], but: Option<usize>) -> Vec<ModelTerm> {
+    in_model.iter().enumerate().filter(|(i, _)| Some(*i) != but).map(|(_, effect)| effect.clone()).collect()
 }

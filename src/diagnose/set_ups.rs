@@ -4,9 +4,9 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use super::diagnosis::rms_of_rows;
+use super::marginal::gram;
 use super::placebo::Placebo;
-use super::search::{Active, Search};
-use super::space::gram;
+use super::search::{ModelTerm, Search};
 use crate::units::{ByQuantity, Quantity, field_by_quantity};
 
 field_by_quantity!(rms);
@@ -41,7 +41,11 @@ pub struct LeftOutRms {
 const FEWEST: usize = 6;
 
 /// Every set-up left out in turn; nothing where there is only one.
-pub(super) fn left_out(search: &Search, told: &[Active], placebos: &[Option<Placebo>]) -> Vec<SetUpLeftOut> {
+pub(super) fn left_out(
+    search: &Search,
+    told: &[ModelTerm],
+    placebos: &[Option<Placebo>],
+) -> Vec<SetUpLeftOut> {
     let names = names(search);
     let effects: Option<Vec<DMatrix<f64>>> = told.iter().map(|effect| effect.raw(search)).collect();
     let meaningless: Vec<DMatrix<f64>> = placebos.iter().flatten().map(|p| p.raw.clone()).collect();
@@ -71,9 +75,9 @@ pub(super) fn left_out(search: &Search, told: &[Active], placebos: &[Option<Plac
 
 /// Whether the first effects foretell set-ups that are left out no worse than the second, lengths and angles alike; `None` where there are
 /// not several.
-pub(super) fn foretell(search: &Search, first: &[Active], second: &[Active]) -> Option<bool> {
+pub(super) fn foretell(search: &Search, first: &[ModelTerm], second: &[ModelTerm]) -> Option<bool> {
     let names = names(search);
-    let squares = |told: &[Active]| -> Option<[f64; 2]> {
+    let squares = |told: &[ModelTerm]| -> Option<[f64; 2]> {
         let effects: Option<Vec<DMatrix<f64>>> = told.iter().map(|effect| effect.raw(search)).collect();
         let left = SetUps::new(search, &names, &effects?).left(search);
         let mut sums = [0.0; 2];

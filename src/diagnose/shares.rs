@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 
+use super::discrepancy;
 use super::leftover::Leftover;
-use super::search::{Active, Rival, Search, side_by_side};
-use super::shape;
-use super::space::Space;
+use super::marginal::Marginal;
+use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
 use crate::effects::Place;
 use crate::feature::Feature;
 
@@ -67,7 +67,7 @@ impl Shares {
 
     /// Part of what shapes may depart from the families' by which they do: what they seem to, or what chance hides of it as likely as not.
     pub fn departure(&self) -> f64 {
-        let hidden = MEDIAN * self.left.heat * (2.0 * self.freedom).sqrt();
+        let hidden = MEDIAN * self.left.overdispersion * (2.0 * self.freedom).sqrt();
         (self.shapes / self.total()).sqrt().max((hidden / self.total()).sqrt().min(UNKNOWN_SHAPE))
     }
 
@@ -81,19 +81,21 @@ impl Shares {
     /// takes, but it is smooth: its shape leaves next to nothing.
     pub fn is_unlike(&self) -> bool {
         let free = if self.left.energy < JUMPS * self.total() { self.free } else { 0.0 };
-        self.shapes - free > UNLIKE * self.total() + CHANCE * self.left.heat * (2.0 * self.freedom).sqrt()
+        self.shapes - free
+            > UNLIKE * self.total() + CHANCE * self.left.overdispersion * (2.0 * self.freedom).sqrt()
     }
 }
 
 impl Search<'_> {
     /// What becomes of the energy that geometry leaves over, what chance would take not counted.
-    pub fn shares(&self, active: &[Active]) -> Shares {
-        let (names, full) = (self.beside_names(active), self.beside(active, None));
-        let energy = |space: &Space| self.rows.residual.dot(&space.apply(&self.rows.residual));
-        let taken = |from: &Space, to: &Space| {
+    pub fn shares(&self, in_model: &[ModelTerm]) -> Shares {
+        let (names, full) = (self.beside_names(in_model), self.beside(in_model, None));
+        let energy = |marginal: &Marginal| self.rows.residual.dot(&marginal.apply(&self.rows.residual));
+        let taken = |from: &Marginal, to: &Marginal| {
             (energy(from) - energy(to) - (to.parameters() - from.parameters())).max(0.0)
         };
-        let drifts = active.iter().filter(|effect| shape::is_drift(&self.candidates[effect.candidate]));
+        let drifts =
+            in_model.iter().filter(|effect| discrepancy::is_drift(&self.candidates[effect.candidate]));
         let courses: Vec<&DMatrix<f64>> = drifts.map(|effect| &effect.shape).collect();
         let free = match courses.is_empty() {
             true => 0.0,
@@ -114,11 +116,11 @@ impl Search<'_> {
     }
 
     /// The place of tones that are so near to one another that they are one, and none of them stands for it: what wanders has no frequency.
-    pub fn wandering(&self, active: &[Active]) -> Option<Place> {
+    pub fn wandering(&self, in_model: &[ModelTerm]) -> Option<Place> {
         let times = || self.rows.linear.samples.iter().filter_map(|s| s.time.as_ref()).flatten();
         let seen = times().copied().fold(f64::NEG_INFINITY, f64::max)
             - times().copied().fold(f64::INFINITY, f64::min);
-        let mut tones: Vec<(f64, f64, Place)> = (active.iter())
+        let mut tones: Vec<(f64, f64, Place)> = (in_model.iter())
             .filter_map(|effect| {
                 let candidate = &self.candidates[effect.candidate];
                 let frequency = candidate.frequency(&effect.score.parameters)?;
@@ -142,11 +144,11 @@ impl Search<'_> {
 
     /// A joint at which more effects than that are functions of where it stands: each a patch of a curve that has no name. Waves of
     /// whole orders count as one.
-    pub fn patched(&self, active: &[Active]) -> Option<Place> {
-        let of_position: Vec<(Place, bool)> = (active.iter())
+    pub fn patched(&self, in_model: &[ModelTerm]) -> Option<Place> {
+        let of_position: Vec<(Place, bool)> = (in_model.iter())
             .map(|effect| (&self.candidates[effect.candidate], &effect.score.parameters))
-            .filter(|(candidate, _)| shape::is_of_position(candidate))
-            .map(|(candidate, at)| (candidate.place, shape::order(self.rows, candidate, at).is_some()))
+            .filter(|(candidate, _)| discrepancy::is_of_position(candidate))
+            .map(|(candidate, at)| (candidate.place, discrepancy::order(self.rows, candidate, at).is_some()))
             .collect();
         let patches = |place: &Place| {
             let here = || of_position.iter().filter(|(at, _)| at == place);
@@ -169,16 +171,17 @@ impl Search<'_> {
 
     /// Whether it is little beside what was found already at its place and has its name, or is another shape along the travel where
     /// a curve was found: that is its shape, unless along a path it alone is all that the curve does not say.
-    pub fn repeats(&self, rival: &Rival, active: &[Active]) -> bool {
+    pub fn repeats(&self, hypothesis: &Hypothesis, in_model: &[ModelTerm]) -> bool {
         let of = |candidate: usize| (&self.candidates[candidate].effect, self.candidates[candidate].place);
-        let is_alike = |a: &Active| of(a.candidate) == of(rival.candidate);
-        let is_of_curve =
-            |a: &Active| shape::is_of_curve(&self.candidates[a.candidate], &self.candidates[rival.candidate]);
-        let is_all = || {
-            let shares = self.shares(active);
-            2.0 * rival.score.gain > ALL * (shares.shapes + shares.left.energy)
+        let is_alike = |a: &ModelTerm| of(a.candidate) == of(hypothesis.candidate);
+        let is_of_curve = |a: &ModelTerm| {
+            discrepancy::is_of_curve(&self.candidates[a.candidate], &self.candidates[hypothesis.candidate])
         };
-        let mut small = active.iter().filter(|a| rival.score.gain < REPEATED * a.score.gain);
+        let is_all = || {
+            let shares = self.shares(in_model);
+            2.0 * hypothesis.score.gain > ALL * (shares.shapes + shares.left.energy)
+        };
+        let mut small = in_model.iter().filter(|a| hypothesis.score.gain < REPEATED * a.score.gain);
         small.any(|a| is_alike(a) || is_of_curve(a) && !(self.in_motion && is_all()))
     }
 
@@ -188,52 +191,56 @@ impl Search<'_> {
     }
 
     /// Whether it may be the course over time of what was found: of two courses the smaller one is the other one's shape.
-    pub fn is_of_course(&self, rival: &Rival, active: &[Active]) -> bool {
+    pub fn is_of_course(&self, hypothesis: &Hypothesis, in_model: &[ModelTerm]) -> bool {
         let is_course =
-            |a: &Active| self.goes_by_clock(a.candidate) && rival.score.gain < SHAPE * a.score.gain;
-        self.goes_by_clock(rival.candidate) && active.iter().any(is_course)
+            |a: &ModelTerm| self.goes_by_clock(a.candidate) && hypothesis.score.gain < SHAPE * a.score.gain;
+        self.goes_by_clock(hypothesis.candidate) && in_model.iter().any(is_course)
     }
 
-    /// Whether an effect is a wave of a whole order, which comes back with every turn, and the rival depends on where the same joint stands
+    /// Whether an effect is a wave of a whole order, which comes back with every turn, and the hypothesis depends on where the same joint stands
     /// and does not, or has fewer waves a turn: then it is no shape of that wave.
-    fn is_no_shape(&self, rival: &Rival, effect: &Active) -> bool {
-        let order = |candidate: usize, at: &[f64]| shape::order(self.rows, &self.candidates[candidate], at);
+    fn is_no_shape(&self, hypothesis: &Hypothesis, effect: &ModelTerm) -> bool {
+        let order =
+            |candidate: usize, at: &[f64]| discrepancy::order(self.rows, &self.candidates[candidate], at);
         let place = |candidate: usize| self.candidates[candidate].place;
-        if place(rival.candidate) != place(effect.candidate)
-            || !shape::is_of_position(&self.candidates[rival.candidate])
+        if place(hypothesis.candidate) != place(effect.candidate)
+            || !discrepancy::is_of_position(&self.candidates[hypothesis.candidate])
         {
             return false;
         }
         let Some(of) = order(effect.candidate, &effect.score.parameters) else { return false };
-        let own = order(rival.candidate, &rival.score.parameters);
+        let own = order(hypothesis.candidate, &hypothesis.score.parameters);
         own.is_none_or(|own| own.round() % of.round() != 0.0)
     }
 
-    /// Whether an effect is a train of waves along the travel, and the rival another function of where the same joint stands.
-    fn is_swell(&self, rival: &Rival, effect: &Active) -> bool {
-        let (own, other) = (&self.candidates[effect.candidate], &self.candidates[rival.candidate]);
-        shape::is_along_travel(other) && shape::periods(self.rows, own, &effect.score.parameters) >= TRAIN
+    /// Whether an effect is a train of waves along the travel, and the hypothesis another function of where the same joint stands.
+    fn is_swell(&self, hypothesis: &Hypothesis, effect: &ModelTerm) -> bool {
+        let (own, other) = (&self.candidates[effect.candidate], &self.candidates[hypothesis.candidate]);
+        discrepancy::is_along_travel(other)
+            && discrepancy::periods(self.rows, own, &effect.score.parameters) >= TRAIN
     }
 
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place and where
     /// both go by the clock.
-    pub fn shape_error(&self, rival: &Rival, active: &[Active]) -> f64 {
+    pub fn shape_error(&self, hypothesis: &Hypothesis, in_model: &[ModelTerm]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
         let timed = |candidate: usize| self.goes_by_clock(candidate);
-        let share = |effect: &Active| {
-            let is_here = place(effect.candidate) == place(rival.candidate);
-            if is_here && self.is_swell(rival, effect) {
+        let share = |effect: &ModelTerm| {
+            let is_here = place(effect.candidate) == place(hypothesis.candidate);
+            if is_here && self.is_swell(hypothesis, effect) {
                 SWELL
-            } else if self.is_no_shape(rival, effect) {
+            } else if self.is_no_shape(hypothesis, effect) {
                 0.0
             } else if is_here {
                 OWN_SHAPE
-            } else if self.is_tone(rival.candidate) || timed(effect.candidate) && timed(rival.candidate) {
+            } else if self.is_tone(hypothesis.candidate)
+                || timed(effect.candidate) && timed(hypothesis.candidate)
+            {
                 CLOCK_SHAPE
             } else {
                 OTHER_SHAPE
             }
         };
-        active.iter().map(|effect| share(effect) * effect.score.gain).sum()
+        in_model.iter().map(|effect| share(effect) * effect.score.gain).sum()
     }
 }

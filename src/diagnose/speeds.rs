@@ -1,6 +1,6 @@
 //! Whether speeds allow to tell what goes with velocity from what goes with direction.
 
-use super::search::{Active, Rival, Search};
+use super::search::{Hypothesis, ModelTerm, Search};
 use crate::effects::Candidate;
 use crate::feature::Feature;
 
@@ -13,42 +13,42 @@ const ALIKE: f64 = 0.9;
 /// The other name is taken where it is likelier by this, as a logarithm.
 const LIKELIER: f64 = 2.0;
 
-/// Rivals with what speeds do not allow to tell from `own` as likely as it is, but for how often each is met and how rare its size is:
+/// Hypotheses with what speeds do not allow to tell from `own` as likely as it is, but for how often each is met and how rare its size is:
 /// where there is one speed only, a lag and play differ in starts and stops alone, and those hang on shapes that nobody knows.
-pub(super) fn levelled(search: &Search, own: &Rival, rivals: Vec<Rival>) -> Vec<Rival> {
-    let level = |r: Rival| match level_with(search, own, &r) {
-        Some(weight) => Rival { weight, ..r },
+pub(super) fn levelled(search: &Search, own: &Hypothesis, hypotheses: Vec<Hypothesis>) -> Vec<Hypothesis> {
+    let level = |r: Hypothesis| match level_with(search, own, &r) {
+        Some(weight) => Hypothesis { weight, ..r },
         None => r,
     };
-    rivals.into_iter().map(level).collect()
+    hypotheses.into_iter().map(level).collect()
 }
 
 /// Effects of which one speed says no more than of another name, as that other one where its size is less rare: two degrees of play are
 /// a rare thing, a delay of 30 ms is not.
-pub(super) fn less_rare(search: &Search, active: Vec<Active>) -> Vec<Active> {
-    let mut active = active;
-    for i in 0..active.len() {
-        let rivals = search.rivals_of(&active, i);
-        let Some(own) = rivals.iter().find(|r| r.candidate == active[i].candidate) else { continue };
-        let levelled = rivals.iter().filter_map(|r| Some((level_with(search, own, r)?, r)));
+pub(super) fn less_rare(search: &Search, in_model: Vec<ModelTerm>) -> Vec<ModelTerm> {
+    let mut in_model = in_model;
+    for i in 0..in_model.len() {
+        let hypotheses = search.rivals_of(&in_model, i);
+        let Some(own) = hypotheses.iter().find(|r| r.candidate == in_model[i].candidate) else { continue };
+        let levelled = hypotheses.iter().filter_map(|r| Some((level_with(search, own, r)?, r)));
         let best = levelled.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(w, _)| *w > own.weight + LIKELIER);
         let Some((_, other)) = best else { continue };
-        if let Some(entered) = search.settle(other, &search.ground(&active, Some(i))) {
-            active[i] = entered.instead_of(&active[i]);
+        if let Some(entered) = search.settle(other, &search.ground(&in_model, Some(i))) {
+            in_model[i] = entered.instead_of(&in_model[i]);
         }
     }
-    active
+    in_model
 }
 
-/// What a rival weighs where speeds do not allow to tell it from `own`; `None` where they do.
-fn level_with(search: &Search, own: &Rival, r: &Rival) -> Option<f64> {
-    let candidate = |r: &Rival| &search.candidates[r.candidate];
+/// What a hypothesis weighs where speeds do not allow to tell it from `own`; `None` where they do.
+fn level_with(search: &Search, own: &Hypothesis, r: &Hypothesis) -> Option<f64> {
+    let candidate = |r: &Hypothesis| &search.candidates[r.candidate];
     let (lag, play) = match (by_velocity(candidate(own)), by_velocity(candidate(r))) {
         (true, false) if by_direction(candidate(r)) => (own, r),
         (false, true) if by_direction(candidate(own)) => (r, own),
         _ => return None,
     };
-    let beforehand = |r: &Rival| search.priors[r.candidate] + search.rows.rarity(candidate(r), &r.score);
+    let beforehand = |r: &Hypothesis| search.priors[r.candidate] + search.rows.rarity(candidate(r), &r.score);
     is_one_at_speed(search, lag, play).then(|| own.weight - beforehand(own) + beforehand(r))
 }
 
@@ -62,13 +62,13 @@ fn by_direction(candidate: &Candidate) -> bool {
 
 /// Whether a lag and what goes with direction hang on one joint alone, which has one speed, and do much the same to the readings
 /// taken at that speed.
-fn is_one_at_speed(search: &Search, lag: &Rival, play: &Rival) -> bool {
+fn is_one_at_speed(search: &Search, lag: &Hypothesis, play: &Hypothesis) -> bool {
     let features = &search.candidates[lag.candidate].features;
     let joints = |features: &[Feature]| -> Vec<usize> { features.iter().flat_map(Feature::joints).collect() };
     if features.len() != 1 || joints(features) != joints(&search.candidates[play.candidate].features) {
         return false;
     }
-    let column = |r: &Rival| {
+    let column = |r: &Hypothesis| {
         let columns = search.rows.raw(&search.candidates[r.candidate], &r.score.parameters)?;
         (columns.ncols() == 1).then(|| columns.column(0).into_owned())
     };

@@ -26,9 +26,9 @@ const LOOKED_AT: usize = 6;
 type Wave = [Vec<f64>; 2];
 
 /// The place and the wave along the sum of its joint's position and another one's that have the most evidence.
-pub(super) fn sums(rows: &Rows, field: &Field, courses: &[Course], heat: f64) -> Option<Standing> {
+pub(super) fn sums(rows: &Rows, field: &Field, courses: &[Course], overdispersion: f64) -> Option<Standing> {
     let (best, tried) = screened(rows, field, courses);
-    let judged = |sum: Sum| Some((sum, sum.judged(rows, field, courses, heat)?));
+    let judged = |sum: Sum| Some((sum, sum.judged(rows, field, courses, overdispersion)?));
     let better = |x: &(Sum, Standing), y: &(Sum, Standing)| x.1.evidence.total_cmp(&y.1.evidence);
     let (mut sum, mut standing) = best.into_iter().filter_map(judged).max_by(better)?;
     // Between the numbers that were tried it may be better.
@@ -109,7 +109,13 @@ struct Sum {
 
 impl Sum {
     /// What it is worth on all rows, beside what is known.
-    fn judged(&self, rows: &Rows, field: &Field, courses: &[Course], heat: f64) -> Option<Standing> {
+    fn judged(
+        &self,
+        rows: &Rows,
+        field: &Field,
+        courses: &[Course],
+        overdispersion: f64,
+    ) -> Option<Standing> {
         let [first, second] = self.of.map(|of| &courses[of]);
         let phases =
             first.along.iter().zip(&second.along).map(|(x, y)| self.waves[0] * x + self.waves[1] * y);
@@ -118,8 +124,9 @@ impl Sum {
             Series::of(first.joint, second.joint, motions(first, self.translates), vec![sines, cosines]);
         let columns = series.columns(rows);
         let (mut standing, count) = (None, columns.ncols());
-        judge(&columns.columns(0, count), &field.space, &field.left, &[0], &mut |_, equations| {
-            let Worth { evidence, gain, .. } = evidence(&equations.gram, &equations.toward, count, heat, 0);
+        judge(&columns.columns(0, count), &field.marginal, &field.left, &[0], &mut |_, equations| {
+            let Worth { evidence, gain, .. } =
+                evidence(&equations.gram, &equations.toward, count, overdispersion, 0);
             standing = Some(series.standing(evidence, gain));
         });
         standing

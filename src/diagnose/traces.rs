@@ -3,7 +3,7 @@
 use super::diagnosis::Diagnosis;
 use super::held_out::Model;
 use super::linear::Span;
-use super::search::{Active, Search};
+use super::search::{ModelTerm, Search};
 use crate::effects::Place;
 use crate::machine::{JointKind, Machine};
 
@@ -95,7 +95,7 @@ const SLIGHT: f64 = 0.02;
 /// Puts the traces into the diagnosis, and what part of the misfit goes with each finding. `last`: residuals with all of them.
 pub(super) fn fill(
     search: &Search,
-    told: &[Active],
+    told: &[ModelTerm],
     last: &[f64],
     machine: &Machine,
     diagnosis: &mut Diagnosis,
@@ -125,8 +125,8 @@ pub(super) fn fill(
     }
     for (i, effect) in told.iter().enumerate() {
         let is_other =
-            |(k, other): &(usize, &Active)| *k != i && !search.is_one(effect.candidate, other.candidate);
-        let others: Vec<Active> =
+            |(k, other): &(usize, &ModelTerm)| *k != i && !search.is_one(effect.candidate, other.candidate);
+        let others: Vec<ModelTerm> =
             told.iter().enumerate().filter(is_other).map(|(_, other)| other.clone()).collect();
         let without = Model::new(search, &others).residual(search, &others);
         let along = match search.candidates[effect.candidate].place {

@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
+use super::discrepancy;
 use super::folds;
-use super::search::{Active, ENTER, NEAR, Rival, Search, all_but};
-use super::shape;
+use super::search::{ENTER, Hypothesis, ModelTerm, NEAR, Search, all_but};
 use crate::effects::Candidate;
 
 impl Search<'_> {
@@ -13,26 +13,26 @@ impl Search<'_> {
     ///
     /// Names come one by one, and no two of them need say as much as a curve of eight orders: only together do they.
     /// `most_wild`: as [`folds::useful`] asks of each.
-    pub fn unfolded(&self, active: Vec<Active>, most_wild: f64) -> Vec<Active> {
-        let is_curve = |effect: &Active| {
+    pub fn unfolded(&self, in_model: Vec<ModelTerm>, most_wild: f64) -> Vec<ModelTerm> {
+        let is_curve = |effect: &ModelTerm| {
             let candidate = &self.candidates[effect.candidate];
-            shape::is_curve(candidate) && effect.score.coefficients >= shape::BENDS
+            discrepancy::is_curve(candidate) && effect.score.coefficients >= discrepancy::BENDS
         };
-        let mut active = active;
+        let mut in_model = in_model;
         let mut i = 0;
-        while i < active.len() {
-            match is_curve(&active[i]).then(|| self.resolved(&active, i, most_wild)).flatten() {
-                Some(names) => active = names,
+        while i < in_model.len() {
+            match is_curve(&in_model[i]).then(|| self.resolved(&in_model, i, most_wild)).flatten() {
+                Some(names) => in_model = names,
                 None => i += 1,
             }
         }
-        active
+        in_model
     }
 
     /// Effects with others in the place of curve `i`; `None` where they say no more.
-    fn resolved(&self, active: &[Active], i: usize, most_wild: f64) -> Option<Vec<Active>> {
-        let curve = &active[i];
-        let others = all_but(active, Some(i));
+    fn resolved(&self, in_model: &[ModelTerm], i: usize, most_wild: f64) -> Option<Vec<ModelTerm>> {
+        let curve = &in_model[i];
+        let others = all_but(in_model, Some(i));
         let alone = self.beside_names(&others);
         let own = self.candidates[curve.candidate].place;
         let is_simple =
@@ -40,30 +40,30 @@ impl Search<'_> {
         let among: Vec<usize> = (0..self.candidates.len()).filter(is_simple).collect();
         let field = self.rows.field(alone);
         let candidate = &self.candidates[curve.candidate];
-        let score = self.rows.score_at(candidate, &curve.score.parameters, &field, self.heat)?;
+        let score = self.rows.score_at(candidate, &curve.score.parameters, &field, self.overdispersion)?;
         let most = score.evidence + self.priors[curve.candidate];
-        let (mut names, mut sum): (Vec<Active>, f64) = (Vec::new(), 0.0);
+        let (mut names, mut sum): (Vec<ModelTerm>, f64) = (Vec::new(), 0.0);
         while others.len() + names.len() < self.most() {
-            let space = Arc::new(self.beside_names(&[others.as_slice(), &names].concat()));
-            let rivals = self.compare(space.clone(), Some(&among));
-            let Some(next) = rivals.iter().find(|r| r.weight > ENTER && !self.repeats(r, &names)) else {
+            let marginal = Arc::new(self.beside_names(&[others.as_slice(), &names].concat()));
+            let hypotheses = self.compare(marginal.clone(), Some(&among));
+            let Some(next) = hypotheses.iter().find(|r| r.weight > ENTER && !self.repeats(r, &names)) else {
                 break;
             };
-            let near = rivals.iter().take(NEAR).map(|r| r.candidate).collect();
+            let near = hypotheses.iter().take(NEAR).map(|r| r.candidate).collect();
             // What a shape of its own would lend it is what the next name takes.
             let weight = next.score.evidence + self.priors[next.candidate];
-            let Some(entered) = self.enter(next, &space) else { break };
-            names.push(Active { near, ..entered });
+            let Some(entered) = self.enter(next, &marginal) else { break };
+            names.push(ModelTerm { near, ..entered });
             sum += weight;
             let resolved = [others.as_slice(), &names].concat();
             let is_useful = || folds::useful(self, &resolved, most_wild).len() == resolved.len();
             // Beside the shapes of the others each has to stand out by itself.
             let stands_out = |i: usize| {
-                let own = |r: &Rival| r.candidate == resolved[i].candidate && r.weight > ENTER;
+                let own = |r: &Hypothesis| r.candidate == resolved[i].candidate && r.weight > ENTER;
                 self.rivals_of(&resolved, i).iter().any(own)
             };
             if sum > most + ENTER
-                && folds::foretell_better(self, &resolved, active)
+                && folds::foretell_better(self, &resolved, in_model)
                 && is_useful()
                 && (0..resolved.len()).all(stands_out)
             {
@@ -77,8 +77,8 @@ impl Search<'_> {
 /// Whether it is a straight line along the travel of one joint, or a wave of so many a turn.
 fn is_line_or_order(candidate: &Candidate) -> bool {
     let is_wave = candidate.features.iter().all(|f| f.wave().is_some());
-    shape::is_of_position(candidate)
-        && !shape::is_curve(candidate)
+    discrepancy::is_of_position(candidate)
+        && !discrepancy::is_curve(candidate)
         && candidate.parameters.iter().all(|p| p.whole)
         && (is_wave || candidate.coefficients.len() == 1)
 }

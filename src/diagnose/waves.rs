@@ -22,7 +22,7 @@ struct Sums<'a> {
 
 impl Rows<'_> {
     /// Energy that pairs of sine and cosine of one phase take away, at every point of the grid, as if they had nothing in common with
-    /// the space; `None` if the features are no such pairs, or a phase is no multiple of one column.
+    /// the marginal; `None` if the features are no such pairs, or a phase is no multiple of one column.
     pub(super) fn harmonics(&self, i: usize, candidate: &Candidate, field: &Field) -> Option<Vec<f64>> {
         let waves = self.waves(i, candidate)?;
         let dual = self.whitener.transposed(field.left.as_slice());

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use super::course::{Course, FINE};
 use super::curves::product;
 use super::evidence::{Worth, evidence};
+use super::marginal::Marginal;
 use super::score::judge;
 use super::search::Search;
 use super::series::{Series, Standing, over_range, series, smooth};
-use super::space::Space;
 use super::sums::sums;
 use crate::effects::Place;
 use crate::machine::Machine;
@@ -24,8 +24,8 @@ const IN_QUESTION: f64 = 0.97;
 /// The place that most of what geometry leaves over depends on, and another joint whose position it goes with.
 pub(super) fn whereabouts(search: &Search, machine: &Machine) -> (Place, Option<usize>) {
     let series = standing(search, machine, search.base.clone());
-    let rivals = search.rivals(&[]);
-    let named = rivals.first().map(|r| Standing {
+    let hypotheses = search.hypotheses(&[]);
+    let named = hypotheses.first().map(|r| Standing {
         place: search.candidates[r.candidate].place,
         with: None,
         evidence: r.weight,
@@ -37,23 +37,24 @@ pub(super) fn whereabouts(search: &Search, machine: &Machine) -> (Place, Option<
         .map_or((Place::Measurement, None), |best| (best.place, best.with))
 }
 
-/// The series of most evidence beside a space.
+/// The series of most evidence beside a marginal.
 ///
 /// Blocks of samples hide a little of every curve, which may be more than what one place is ahead of another: they say which series come
 /// into question, and all samples which of these it is.
-pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Option<Standing> {
-    let (rows, heat) = (search.rows, search.heat);
-    let field = rows.field(space);
+pub(super) fn standing(search: &Search, machine: &Machine, marginal: Marginal) -> Option<Standing> {
+    let (rows, overdispersion) = (search.rows, search.overdispersion);
+    let field = rows.field(marginal);
     let one = |series: &Series, level: Option<usize>| {
-        let (space, left) = level.map_or((&*field.space, &field.left), |level| {
-            let (space, left) = rows.on_level(&field, level);
-            (space, left)
+        let (marginal, left) = level.map_or((&*field.marginal, &field.left), |level| {
+            let (marginal, left) = rows.on_level(&field, level);
+            (marginal, left)
         });
         let columns = level.map_or_else(|| series.columns(rows), |level| series.on_blocks(rows, level));
         let mut standing = None;
         let count = columns.ncols();
-        judge(&columns.columns(0, count), space, left, &[0], &mut |_, equations| {
-            let Worth { evidence, gain, .. } = evidence(&equations.gram, &equations.toward, count, heat, 0);
+        judge(&columns.columns(0, count), marginal, left, &[0], &mut |_, equations| {
+            let Worth { evidence, gain, .. } =
+                evidence(&equations.gram, &equations.toward, count, overdispersion, 0);
             standing = Some(series.standing(evidence, gain));
         });
         standing
@@ -71,7 +72,7 @@ pub(super) fn standing(search: &Search, machine: &Machine, space: Space) -> Opti
         if on_blocks && standing.gain > IN_QUESTION * most { one(series, None) } else { Some(standing) }
     };
     let mut settled: Vec<Standing> = all.par_iter().zip(&judged).filter_map(fine).collect();
-    settled.extend(sums(rows, &field, &courses, heat));
+    settled.extend(sums(rows, &field, &courses, overdispersion));
     settled.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
 

@@ -6,6 +6,7 @@ use rand::rngs::StdRng;
 
 use super::evaluator::{EXTRAS, Evaluator, Moment};
 use super::loss::Loss;
+use super::noise::Noise;
 use super::source::{Source, Sources};
 use super::stretch::Stretch;
 use super::thin::Thin;
@@ -20,9 +21,6 @@ use crate::motion::Tracker;
 use crate::recording::Chunk;
 use crate::sensor::{MOST_READINGS, Sensor};
 use crate::units::{ByQuantity, Quantity, Rms};
-
-/// Noise of a source's readings: standard deviations.
-pub(crate) type Noise = ByQuantity<f64>;
 
 /// Sums over residuals of one quantity.
 #[derive(Clone, Copy, Debug, Default)]

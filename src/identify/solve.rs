@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::information::open_directions;
 use super::loss::Loss;
-use super::normal::{Noise, Normal, accumulate, set_up_geometry};
+use super::noise::Noise;
+use super::normal::{Normal, accumulate, set_up_geometry};
 use super::source::Sources;
 use super::thin::Thin;
 use super::unknowns::{Block, Layout, Unknowns};

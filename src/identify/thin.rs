@@ -1,7 +1,7 @@
 //! A thin selection of samples for what does not need all of them: alignment and robust scales.
 
 use super::evaluator::{Evaluator, Moment};
-use super::normal::Noise;
+use super::noise::Noise;
 use super::source::Sources;
 use super::unknowns::Unknowns;
 use crate::error::Result;

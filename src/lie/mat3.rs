@@ -1,12 +1,14 @@
 //! A 3 × 3 matrix, rows first, for rotations and the small matrices around them.
 
+use serde::{Deserialize, Serialize};
+
 use std::ops::{Add, Mul};
 
 use super::Vec3;
 use crate::scalar::Scalar;
 
 /// Three rows of three components.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mat3<S>(pub [[S; 3]; 3]);
 
 impl<S: Scalar> Mat3<S> {

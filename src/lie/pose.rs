@@ -1,5 +1,7 @@
 //! Poses: elements of SE(3).
 
+use serde::{Deserialize, Serialize};
+
 use std::ops::Mul;
 
 use super::series::{Coefficients, half_angle_per_sine};
@@ -18,7 +20,7 @@ use crate::scalar::Scalar;
 /// let p = quarter.transform(Vec3::new(1.0, 0.0, 0.0));
 /// assert!((p.0[1] - 1.0).abs() < 1e-15 && p.0[0].abs() < 1e-15);
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose<S> {
     /// Rotation matrix.
     pub rotation: Mat3<S>,

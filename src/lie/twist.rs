@@ -1,5 +1,7 @@
 //! Twists (v; w), wrenches (f; m) and the matrices of the adjoint representation.
 
+use serde::{Deserialize, Serialize};
+
 use std::ops::{Add, Neg, Sub};
 
 use super::series::{Coefficients, inverse_jacobian_coefficient};
@@ -7,7 +9,7 @@ use super::{Mat3, Vec3};
 use crate::scalar::Scalar;
 
 /// An element of se(3), linear part first: `v` in m, `w` in rad, in the frame that its name or documentation says.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Twist<S> {
     /// Linear part, m.
     pub v: Vec3<S>,
@@ -16,7 +18,7 @@ pub struct Twist<S> {
 }
 
 /// A linear form on twists, `f·v + m·w`: the row of a scalar measurement, carried along the chain like a force and its moment.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wrench<S> {
     /// What multiplies `v`.
     pub f: Vec3<S>,
@@ -25,7 +27,7 @@ pub struct Wrench<S> {
 }
 
 /// A 6 × 6 matrix on twists in blocks `[[linear, coupling], [0, angular]]`; every adjoint matrix has this form.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Adjoint<S> {
     /// Upper left and lower right block.
     pub diagonal: Mat3<S>,

@@ -1,11 +1,13 @@
 //! A small vector of three scalars, written by hand so that duals and lanes run it.
 
+use serde::{Deserialize, Serialize};
+
 use std::ops::{Add, Neg, Sub};
 
 use crate::scalar::Scalar;
 
 /// Three components; what they mean (m, rad, 1) is said where it is used.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Vec3<S>(pub [S; 3]);
 
 impl<S: Scalar> Vec3<S> {

@@ -1,6 +1,7 @@
 //! The cone of the demonstration, on any machine that reaches it with any of its axes.
 
-use super::{inverse, random_commands};
+use super::all_axes::AllAxes;
+use super::random_commands;
 use crate::chain::Chain;
 use crate::lie::Vec3;
 use crate::machine::Machine;
@@ -28,14 +29,14 @@ pub fn cone(machine: &Machine, length: f64, inclination: f64, count: usize) -> O
             (from..=to).contains(&q[c])
         })
     };
+    let axes = AllAxes::new(machine);
     let starts = random_commands(machine, 200, 1);
-    let first =
-        starts.iter().filter_map(|start| inverse(&chain, machine, p_w, axis_w, start)).find(|q| inside(q))?;
+    let first = starts.iter().filter_map(|start| axes.at(&chain, p_w, axis_w, start)).find(|q| inside(q))?;
     let mut path = vec![first];
     for k in 1..2 * count {
         let turn = if k < count { k as f64 } else { (2 * count - 1 - k) as f64 } / (count - 1) as f64;
         let (p_w, axis_w) = target(turn * std::f64::consts::TAU);
-        let next = inverse(&chain, machine, p_w, axis_w, path.last()?)?;
+        let next = axes.at(&chain, p_w, axis_w, path.last()?)?;
         path.push(next);
     }
     Some(path)

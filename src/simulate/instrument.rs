@@ -9,7 +9,7 @@ use crate::machine::{JointKind, Machine};
 use crate::sensor::{Sensor, SensorState};
 use crate::units::{ByQuantity, Quantity};
 
-/// How readings scatter; the size is [`Instrument::noise_m`] or [`Instrument::noise_rad`].
+/// How readings scatter; the size is [`Instrument::noise`].
 #[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scatter {

@@ -3,10 +3,11 @@
 //! All of them are one path over an angle `u`; linear axes are solved from the rotary motion so that the nominal machine keeps
 //! the distance of the two balls. `docs/simulate.md` has the equations.
 
+use super::all_axes::AllAxes;
 use super::course::{At, Course, Sample, Samples, within_travel};
 use super::follow::{aim, commands_of, every_aim, follow};
 use super::profile::{Leg, ticks};
-use super::{inverse, random_commands};
+use super::random_commands;
 use crate::chain::Chain;
 use crate::error::{Error, Result};
 use crate::lie::{Mat3, Vec3};
@@ -148,7 +149,7 @@ pub struct Turning {
     /// The bar's direction in the body that [`Figure::Rotary`] names.
     bar: Vec3<f64>,
     /// The circle's solution by all axes, where linear ones do not suffice.
-    by_all: bool,
+    by_all: Option<AllAxes>,
 }
 
 impl Turning {
@@ -178,7 +179,7 @@ impl Turning {
             rotary: commands_of(machine, JointKind::Revolute),
             start: held.to_vec(),
             bar: Vec3([0.0; 3]),
-            by_all: false,
+            by_all: None,
         };
         let Some(first) = turning.legs.first().map(|leg| leg.from) else {
             return Err(motion("the test has no leg", "ask for at least one turn"));
@@ -265,7 +266,8 @@ impl Turning {
                 if self.rotary.is_empty() {
                     self.go(first, first + std::f64::consts::FRAC_PI_2, &mut start)?;
                 }
-                self.by_all = true;
+                let axes = AllAxes::new(&self.machine);
+                self.by_all = Some(axes.clone());
                 if self.balls.tool_point_t.0[..2] != [0.0, 0.0] {
                     return Err(motion(
                         "with all joints, a circle is solved for a tool ball on the z axis of frame t only",
@@ -275,8 +277,7 @@ impl Turning {
                 let (p_w, chain) =
                     (self.tool_frame_target(self.circle(plane_w, first), tool_axis_w), &self.chain);
                 let tries = std::iter::once(self.start.clone()).chain(random_commands(&self.machine, 60, 1));
-                let reached =
-                    tries.filter_map(|from| inverse(chain, &self.machine, p_w?, tool_axis_w, &from));
+                let reached = tries.filter_map(|from| axes.at(chain, p_w?, tool_axis_w, &from));
                 let inside = |q: &Vec<f64>| within_travel(&self.machine, q, At::Turn(first)).is_ok();
                 Ok(reached.filter(inside).take(8).collect())
             }
@@ -383,9 +384,9 @@ impl Turning {
         let target = match &self.figure {
             Figure::Circle { plane_w, tool_axis_w } => {
                 let target = self.circle(*plane_w, u);
-                if self.by_all {
+                if let Some(axes) = &self.by_all {
                     let p_w = self.tool_frame_target(target, *tool_axis_w);
-                    let reached = p_w.and_then(|p_w| inverse(chain, machine, p_w, *tool_axis_w, q));
+                    let reached = p_w.and_then(|p_w| axes.at(chain, p_w, *tool_axis_w, q));
                     *q = reached.ok_or_else(|| unreached(u))?;
                     return Ok(0.0);
                 }

@@ -2,11 +2,15 @@
 #![allow(dead_code)]
 
 pub mod channels;
+pub mod draws;
+pub mod paper;
 pub mod random;
 
 use std::path::{Path, PathBuf};
 
-use kincal::Machine;
+use kincal::inverse::{Goal, Inverse, InverseOptions, Mode, Outcome};
+use kincal::lie::{Mat3, Pose, Vec3};
+use kincal::{Chain, Machine};
 
 /// Every shipped machine with the stem of its file, sorted.
 pub fn machines() -> Vec<(String, Machine)> {
@@ -54,4 +58,22 @@ pub fn read_or_refused<T>(outcome: kincal::Result<T>, file: &str) -> Option<T> {
             assert!(!error.mend().is_empty(), "{error} has no mend");
         })
         .ok()
+}
+
+/// Commands that bring the origin of frame `t` to `p_w` (m) and its z axis along `axis_w` (unit vector), whatever the travel.
+pub fn aimed(
+    chain: &Chain<f64>,
+    machine: &Machine,
+    p_w: Vec3<f64>,
+    axis_w: Vec3<f64>,
+    start: &[f64],
+) -> Option<Vec<f64>> {
+    let exact = InverseOptions::default().with_weak(1e-6).with_within_travel(false);
+    let inverse = Inverse::new(machine).with_mode(Mode::PositionAndAxis).with_options(exact);
+    let first = axis_w.across()[0];
+    let columns = [first, axis_w.cross(first), axis_w];
+    let rotation = Mat3(std::array::from_fn(|i| std::array::from_fn(|j| columns[j].0[i])));
+    let goal = Goal { t_from_tip: Pose::identity(0.0), w_from_tip: Pose { rotation, translation: p_w } };
+    let solution = inverse.solve(chain, &goal, start, &vec![true; start.len()]);
+    (solution.outcome == Outcome::Reached).then_some(solution.commands)
 }

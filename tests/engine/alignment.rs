@@ -138,7 +138,7 @@ fn two_socket_points_leave_the_turn_about_their_line_and_that_is_told() {
         let target = m_from_w.transform(socket + play);
         let axis = Vec3([(k as f64).sin(), (k as f64).cos(), 0.7]);
         let axis = axis.times(1.0 / axis.norm());
-        let Some(q) = kincal::simulate::inverse(&chain, &machine, target, axis, start) else { continue };
+        let Some(q) = common::aimed(&chain, &machine, target, axis, start) else { continue };
         let q: Vec<String> = q.iter().map(|x| format!("{x:.12}")).collect();
         csv.push_str(&format!("{},{},0,0\n", q.join(","), socket.0[0]));
         made += 1;

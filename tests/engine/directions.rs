@@ -1,13 +1,14 @@
 //! Models keyed on directions of travel on the paper's machine.
 
-use crate::common;
+use std::ops::Range;
+
 use crate::common::random::Random;
+use crate::common::{self, aimed};
 use crate::table::{Axes, Bar, Best, SIGMA, Table, path, record};
 use kincal::feature::Feature;
 use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};
 use kincal::lie::Twist;
 use kincal::recording::Recording;
-use kincal::simulate::inverse;
 use kincal::variation::{Directions, Part, Slot, Term, Varying};
 use kincal::{CalibratedMachine, Chain, Machine};
 use rayon::prelude::*;
@@ -127,7 +128,7 @@ fn corrected(model: &CalibratedMachine, path: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (path.iter().zip(directions(path)))
         .map(|(q, d)| {
             let wanted = nominal.w_from_t(q);
-            inverse(&chain(model, &d, q), machine, wanted.translation, wanted.rotation.column(2), q)
+            aimed(&chain(model, &d, q), machine, wanted.translation, wanted.rotation.column(2), q)
                 .expect("reached")
         })
         .collect()
@@ -202,12 +203,12 @@ struct Elsewhere {
     to_best: [f64; 3],
 }
 
-/// Trains on three paths and judges on others, `SEEDS` tables from `first_seed` on.
+/// Trains on three paths and judges on others, on these tables.
 fn elsewhere(
     machine: &Machine,
     trained: &[Vec<Vec<f64>>; 3],
     unseen: &[Vec<Vec<f64>>],
-    first_seed: u64,
+    tables: Range<u64>,
 ) -> Elsewhere {
     let best = Best::new(machine, &trained.each_ref().map(|p| &p[..]));
     let expected: Vec<f64> = unseen.iter().map(|path| best.expected_error(machine, path) * 1e6).collect();
@@ -231,9 +232,9 @@ fn elsewhere(
         });
         judged.collect()
     };
-    let all: Vec<Vec<[f64; 4]>> = (first_seed..first_seed + SEEDS).into_par_iter().map(one).collect();
+    let all: Vec<Vec<[f64; 4]>> = tables.into_par_iter().map(one).collect();
     for (path, expected) in expected.iter().enumerate() {
-        let mean = |k: usize| all.iter().map(|of| of[path][k]).sum::<f64>() / SEEDS as f64;
+        let mean = |k: usize| all.iter().map(|of| of[path][k]).sum::<f64>() / all.len() as f64;
         let [pieces, unified, best] = [0, 1, 3].map(mean);
         println!(
             "path {path}: pieces {pieces:.2}, unified {unified:.2}, best {best:.2} (expected {expected:.2}) um"
@@ -253,7 +254,7 @@ fn elsewhere(
             "{name} over the best: mean {:.3}, root mean square {:.3}, median of tables {by_table:.3}; mean over the best's expected {:.3}",
             to_best[k],
             (squares(k) / squares(3)).sqrt(),
-            over_all(k) / SEEDS as f64 / expected.iter().sum::<f64>()
+            over_all(k) / all.len() as f64 / expected.iter().sum::<f64>()
         );
     }
     told
@@ -281,26 +282,30 @@ fn training(machine: &Machine) -> [(&'static str, [Vec<Vec<f64>>; 3]); 5] {
 /// Of the plans of `training` the first is the one after which the best estimator is expected to err least on these paths, which is known
 /// before anything is measured. That it holds the limits on all three ranges of tables was seen before it was chosen; others do not,
 /// docs/directions.md.
-fn pieces_and_one_model_are_near_the_best(first_seed: u64) {
+fn pieces_and_one_model_are_near_the_best(tables: Range<u64>) -> Elsewhere {
     let machine = common::machine("ac_table_tilting_paper");
     let [(name, trained), ..] = training(&machine);
-    println!("trained on {name}, tables from {first_seed}");
-    let told = elsewhere(&machine, &trained, &paths_to_judge_on(&machine), first_seed);
+    println!("trained on {name}, tables {tables:?}");
+    let told = elsewhere(&machine, &trained, &paths_to_judge_on(&machine), tables);
     assert!(told.median <= 1.0 && told.worst <= 1.1, "{} {}", told.median, told.worst);
     let [pieces, unified, bent] = told.to_best;
     assert!(pieces <= 1.15 && unified <= 1.15, "{:?}", told.to_best);
-    assert!(bent > 1.2, "room for error motions is what it takes: {bent}");
+    assert!(bent > pieces && bent > unified, "room for error motions helps: {:?}", told.to_best);
+    told
 }
 
 #[test]
 fn on_paths_not_trained_on_pieces_are_no_worse_than_one_model_and_both_are_near_the_best() {
-    pieces_and_one_model_are_near_the_best(0);
+    pieces_and_one_model_are_near_the_best(0..4);
 }
 
 #[test]
-#[ignore = "long: forty more tables"]
-fn so_they_are_on_tables_of_two_other_ranges() {
-    [1000, 2000].into_iter().for_each(pieces_and_one_model_are_near_the_best);
+#[ignore = "long: sixty tables"]
+fn so_they_are_on_more_tables_of_three_ranges() {
+    for first in [0, 1000, 2000] {
+        let [.., bent] = pieces_and_one_model_are_near_the_best(first..first + SEEDS).to_best;
+        assert!(bent > 1.2, "room for error motions is what it takes: {bent}");
+    }
 }
 
 /// What is expected of the best estimator on the paths of [`paths_to_judge_on`], summed, m.
@@ -330,7 +335,7 @@ fn comparison_on_other_training_paths() {
     let all = sets[1..].iter().flat_map(|set| [0, 1000, 2000].map(|first_seed| (set, first_seed)));
     for ((name, trained), first_seed) in all {
         println!("trained on {name}, tables from {first_seed}");
-        let told = elsewhere(&machine, trained, &unseen, first_seed);
+        let told = elsewhere(&machine, trained, &unseen, first_seed..first_seed + SEEDS);
         assert!(told.to_best[0] < told.to_best[2], "room for error motions helps");
     }
 }
@@ -347,7 +352,7 @@ fn comparison_of_every_three_of_five_paths() {
             let rest: Vec<usize> = (0..5).filter(|k| *k != first && *k != second).collect();
             println!("trained on paths {rest:?}, judged on {first} and {second}, tables from 1000");
             let trained = [0, 1, 2].map(|k| all[rest[k]].clone());
-            let told = elsewhere(&machine, &trained, &judged, 1000);
+            let told = elsewhere(&machine, &trained, &judged, 1000..1000 + SEEDS);
             assert!(told.to_best[0] < told.to_best[2], "room for error motions helps");
         }
     }

@@ -3,14 +3,15 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::common;
+use crate::common::paper::{paper_path, paper_plant};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::machine::JointKind;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
 use kincal::simulate::{
     At, Balls, Claims, Course, Family, Faults, Figure, Instrument, Leg, Pace, Plant, Pointing, RandomPoses,
-    Rounding, Run, Sample, Scatter, Sense, Standard, Style, Turning, Turns, Wave, noise_of, paper_path,
-    paper_plant, plane_across, recordings, rest, usual_range,
+    Rounding, Run, Sample, Scatter, Sense, Standard, Style, Turning, Turns, Wave, noise_of, plane_across,
+    recordings, rest, usual_range,
 };
 use kincal::{CalibratedMachine, Chain, Machine};
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::diagnosis::Named;
 use super::held_out::Model;
-use super::search::{Active, Rival, Search};
+use super::search::{Hypothesis, ModelTerm, Search};
 use super::set_ups;
 use crate::effects::Library;
 use crate::machine::Machine;
@@ -26,11 +26,11 @@ pub struct Companion {
 
 /// Effects that hardly ever come alone, at all other places where they are more likely than not, beside those that are kept; each time the
 /// one with the greatest evidence.
-pub(super) fn companions(search: &Search, library: &Library, kept: &[Active]) -> Vec<Active> {
+pub(super) fn companions(search: &Search, library: &Library, kept: &[ModelTerm]) -> Vec<ModelTerm> {
     let of = |candidate: usize| &search.candidates[candidate];
     let comes_along = |candidate: usize| {
         let (own, family) = (of(candidate), &library.families()[of(candidate).family]);
-        let is_alike = |effect: &Active| match family.each_setup {
+        let is_alike = |effect: &ModelTerm| match family.each_setup {
             true => of(effect.candidate).family == own.family,
             false => {
                 family.at_every_joint && !search.in_motion && of(effect.candidate).told_as == own.told_as
@@ -38,27 +38,27 @@ pub(super) fn companions(search: &Search, library: &Library, kept: &[Active]) ->
         };
         own.parameters.is_empty() && kept.iter().any(is_alike)
     };
-    let known = |all: &[Active], candidate: usize| all.iter().any(|effect| effect.candidate == candidate);
+    let known = |all: &[ModelTerm], candidate: usize| all.iter().any(|effect| effect.candidate == candidate);
     let mut all = kept.to_vec();
     let mut left: Vec<usize> =
         (0..search.candidates.len()).filter(|i| comes_along(*i) && !known(kept, *i)).collect();
     while !left.is_empty() {
-        let space = Arc::new(search.beside(&all, None));
-        let field = search.rows.field(space.clone());
+        let marginal = Arc::new(search.beside(&all, None));
+        let field = search.rows.field(marginal.clone());
         let judged = left.iter().filter_map(|i| {
-            let score = search.rows.score_at(of(*i), &[], &field, search.heat)?;
-            Some(Rival::new(*i, score.evidence, score))
+            let score = search.rows.score_at(of(*i), &[], &field, search.overdispersion)?;
+            Some(Hypothesis::new(*i, score.evidence, score))
         });
         let Some(best) = judged.max_by(|a, b| a.weight.total_cmp(&b.weight)).filter(|r| r.weight > 0.0)
         else {
             break;
         };
         left.retain(|i| *i != best.candidate);
-        all.extend(search.enter(&best, &space));
+        all.extend(search.enter(&best, &marginal));
     }
     // What every joint has may still be different from what it is taken for, where set-ups that are left out do not bear it out.
-    let of_set_up = |effect: &Active| library.families()[of(effect.candidate).family].each_setup;
-    let borne_out: Vec<Active> = all
+    let of_set_up = |effect: &ModelTerm| library.families()[of(effect.candidate).family].each_setup;
+    let borne_out: Vec<ModelTerm> = all
         .iter()
         .enumerate()
         .filter(|(i, e)| *i < kept.len() || of_set_up(e))
@@ -74,12 +74,12 @@ pub(super) fn companions(search: &Search, library: &Library, kept: &[Active]) ->
 pub(super) fn named(
     search: &Search,
     (machine, library): (&Machine, &Library),
-    kept: &[Active],
-    companions: &[Active],
+    kept: &[ModelTerm],
+    companions: &[ModelTerm],
 ) -> Vec<Named> {
     let all = [kept, companions].concat();
     let model = Model::new(search, &all);
-    let one = |(i, effect): (usize, &Active)| {
+    let one = |(i, effect): (usize, &ModelTerm)| {
         let candidate = &search.candidates[effect.candidate];
         let solved = model.effect(search, &all, kept.len() + i, 0.0);
         let identified = solved.identified(candidate, library, effect.score.parameters.clone());

@@ -4,8 +4,8 @@ use nalgebra::DVector;
 
 use super::held_out::Model;
 use super::linear::{Displaced, Linear};
-use super::search::{Active, Search};
-use super::space::Space;
+use super::marginal::Marginal;
+use super::search::{ModelTerm, Search};
 use crate::effects::Candidate;
 use crate::error::Result;
 use crate::machine::Machine;
@@ -18,26 +18,27 @@ const SWAYS: f64 = 10.0;
 /// The machine linearised anew where geometry and effects stand; `None` where it is as good as linear.
 ///
 /// Residuals are again those without the effects, as they would be if the machine were linear: what is left where they stand, and to
-/// that what they do there. A step of Gauss and Newton from there finds them exactly, and so do their rivals.
+/// that what they do there. A step of Gauss and Newton from there finds them exactly, and so do their hypotheses.
 pub(super) fn straightened(
     search: &Search,
-    active: &[Active],
+    in_model: &[ModelTerm],
     machine: &Machine,
     recordings: &[Recording],
     dead_bands: &[f64],
 ) -> Result<Option<Linear>> {
     let linear = search.rows.linear;
-    let model = Model::new(search, active);
+    let model = Model::new(search, in_model);
     let mut to = Displaced {
         constants: model.constants(search),
         terms: Vec::new(),
         coefficients: Vec::new(),
         features: Vec::new(),
     };
-    for (i, effect) in active.iter().enumerate() {
+    for (i, effect) in in_model.iter().enumerate() {
         let candidate = &search.candidates[effect.candidate];
         let features = candidate.over(&linear.samples, &effect.score.parameters);
-        for (coefficient, value) in candidate.coefficients.iter().zip(model.coefficients(search, active, i)) {
+        for (coefficient, value) in candidate.coefficients.iter().zip(model.coefficients(search, in_model, i))
+        {
             let mut parts = Vec::new();
             for part in &coefficient.parts {
                 // What is added to a reading bends nothing.
@@ -53,16 +54,16 @@ pub(super) fn straightened(
         }
     }
     let displaced = linear.displaced(machine, recordings, dead_bands, &to)?;
-    let energy = |left: &[f64], beside: &Space| {
+    let energy = |left: &[f64], beside: &Marginal| {
         let mut white = DVector::zeros(left.len());
         search.rows.whitener.apply(left, white.as_mut_slice());
         beside.apply(&white).norm_squared()
     };
     let there = displaced.residual.iter().zip(&displaced.acting).map(|(all, acting)| all - acting);
     let there: Vec<f64> = there.collect();
-    let expected = model.residual_without(search, active, moves_machine);
+    let expected = model.residual_without(search, in_model, moves_machine);
     let bend: Vec<f64> = there.iter().zip(expected).map(|(a, b)| a - b).collect();
-    let bend = energy(&bend, &search.beside(active, None));
+    let bend = energy(&bend, &search.beside(in_model, None));
     let is_nearer = energy(&there, &search.base) < energy(&linear.residual, &search.base);
     Ok((is_nearer && bend > SWAYS).then_some(displaced))
 }

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::diagnosis::{Diagnosis, HeldOutRms};
+use super::discrepancy;
 use super::held_out::Model;
-use super::search::{Active, Search};
-use super::shape;
+use super::search::{ModelTerm, Search};
 use crate::effects::{Candidate, Place};
 use crate::feature::Feature;
 use crate::variation::Slot;
@@ -21,12 +21,13 @@ const BETTER: f64 = 0.9;
 
 /// Candidates as they are where axes follow their commands as late as was found; `plain`: as they are where none is late. `None` where
 /// noise would hide what that changes.
-pub(super) fn late(search: &Search, active: &[Active], plain: &[Candidate]) -> Option<Vec<Candidate>> {
-    let model = Model::new(search, active);
+pub(super) fn late(search: &Search, in_model: &[ModelTerm], plain: &[Candidate]) -> Option<Vec<Candidate>> {
+    let model = Model::new(search, in_model);
     let mut lags: BTreeMap<usize, f64> = BTreeMap::new();
-    for (i, effect) in active.iter().enumerate() {
+    for (i, effect) in in_model.iter().enumerate() {
         let candidate = &search.candidates[effect.candidate];
-        for (coefficient, value) in candidate.coefficients.iter().zip(model.coefficients(search, active, i)) {
+        for (coefficient, value) in candidate.coefficients.iter().zip(model.coefficients(search, in_model, i))
+        {
             for part in &coefficient.parts {
                 let joint = match part.slot {
                     Slot::Before(j) | Slot::After(j) => j,
@@ -39,7 +40,7 @@ pub(super) fn late(search: &Search, active: &[Active], plain: &[Candidate]) -> O
         }
     }
     let is_here = |candidate: &Candidate| {
-        shape::is_of_position(candidate)
+        discrepancy::is_of_position(candidate)
             && candidate.features[0].joints().iter().all(|j| lags.contains_key(j))
     };
     let late = |f: &Feature| lags.iter().fold(f.clone(), |f, (j, by)| f.late(*j, *by));
@@ -50,7 +51,7 @@ pub(super) fn late(search: &Search, active: &[Active], plain: &[Candidate]) -> O
         ..less(candidate)
     };
     let mut change = 0.0;
-    for (i, effect) in active.iter().enumerate() {
+    for (i, effect) in in_model.iter().enumerate() {
         let (now, then) = (&search.candidates[effect.candidate], &plain[effect.candidate]);
         if !is_here(then) {
             continue;
@@ -58,7 +59,7 @@ pub(super) fn late(search: &Search, active: &[Active], plain: &[Candidate]) -> O
         let raw = |candidate: &Candidate| search.rows.raw(candidate, &effect.score.parameters);
         let (now, then) = (raw(now)?, raw(&delayed(then))?);
         let units = search.rows.units(&search.candidates[effect.candidate], &effect.score.parameters);
-        let values = model.coefficients(search, active, i);
+        let values = model.coefficients(search, in_model, i);
         let sizes =
             values.iter().zip(&units).map(|(value, unit)| if *unit > 0.0 { value / unit } else { 0.0 });
         let sizes = DVector::from_iterator(values.len(), sizes);
@@ -72,9 +73,9 @@ pub(super) fn late(search: &Search, active: &[Active], plain: &[Candidate]) -> O
 
 /// A joint of which more was found than is usual, that goes with its direction, its speed or the time, where no lag of it was: a large lag
 /// makes waves of its position come too late one way and too early the other, and no single name but its own takes that.
-pub(super) fn may_be_late(search: &Search, active: &[Active]) -> Option<usize> {
+pub(super) fn may_be_late(search: &Search, in_model: &[ModelTerm]) -> Option<usize> {
     let lags = |joint: usize| search.candidates.iter().any(|c| is_lag(c) && lagging(c).contains(&joint));
-    let known: Vec<usize> = active
+    let known: Vec<usize> = in_model
         .iter()
         .map(|e| &search.candidates[e.candidate])
         .filter(|c| is_lag(c))
@@ -86,15 +87,15 @@ pub(super) fn may_be_late(search: &Search, active: &[Active]) -> Option<usize> {
         .filter_map(|c| if let Place::Joint(j) = c.place { Some(j) } else { None })
         .collect();
     let only = moving.first().copied().filter(|first| moving.iter().all(|j| j == first));
-    active.iter().enumerate().find_map(|(i, effect)| {
+    in_model.iter().enumerate().find_map(|(i, effect)| {
         let candidate = &search.candidates[effect.candidate];
         let joint = match candidate.place {
             Place::Joint(j) => Some(j),
             _ => only,
         }?;
-        let rivals = search.rivals_of(active, i);
-        let own = rivals.iter().find(|r| r.candidate == effect.candidate)?;
-        let is_asked = !shape::is_of_position(candidate)
+        let hypotheses = search.rivals_of(in_model, i);
+        let own = hypotheses.iter().find(|r| r.candidate == effect.candidate)?;
+        let is_asked = !discrepancy::is_of_position(candidate)
             && lags(joint)
             && !known.contains(&joint)
             && search.rows.rarity(candidate, &own.score) < RARE;
@@ -108,7 +109,7 @@ pub(super) fn but_late(candidates: &[Candidate], joint: usize) -> Vec<Candidate>
         matches!(candidate.place, Place::Joint(j) if j != joint)
             || candidate.features.iter().flat_map(Feature::joints).any(|j| j != joint)
     };
-    let stays = |c: &&Candidate| is_elsewhere(c) || shape::is_of_position(c) || is_lag(c);
+    let stays = |c: &&Candidate| is_elsewhere(c) || discrepancy::is_of_position(c) || is_lag(c);
     candidates.iter().filter(stays).cloned().collect()
 }
 

@@ -1,26 +1,18 @@
 //! The path and the preset errors of the paper, as its tables print them.
 
-use rand::SeedableRng;
+use kincal::lie::{Twist, Vec3};
+use kincal::machine::JointKind;
+use kincal::simulate::{Balls, Faults, Figure, Pace, Plant, Rounding, Sense, Turning, Turns, Width, rest};
+use kincal::{CalibratedMachine, Machine, Result};
 use rand::rngs::StdRng;
-
-use super::faults::{Faults, Width};
-use super::follow::commands_of;
-use super::instrument::normal;
-use super::plant::Plant;
-use super::profile::Pace;
-use super::turning::{Balls, Figure, Rounding, Turning};
-use super::turns::{Sense, Turns, rest};
-use crate::calibration::CalibratedMachine;
-use crate::error::Result;
-use crate::lie::{Twist, Vec3};
-use crate::machine::{JointKind, Machine};
+use rand::{RngExt, SeedableRng};
 
 /// The executed path of the paper (tables 7 and 9) with a bar of `length` (m): the cone without tool centre point function, both
 /// rotary axes against the sense that aims the tool, a stop after each half turn, to 360° and back, a position every `step` (rad;
 /// the paper has 0.1°), rounded as the tables are. `docs/simulate.md` says how that was found out.
 ///
 /// # Errors
-/// [`Error::Motion`](crate::Error::Motion) where the machine has not two rotary axes, or does not reach the path.
+/// `Error::Motion` where the machine has not two rotary axes, or does not reach the path.
 pub fn paper_path(machine: &Machine, length: f64, step: f64) -> Result<Turning> {
     use std::f64::consts::{FRAC_PI_4, FRAC_PI_6};
     let figure = Figure::Cone {
@@ -59,8 +51,7 @@ pub fn paper_plant(machine: &Machine, seed: u64) -> Plant {
         let name = &machine.commands()[*command];
         machine.joints().find(|(_, joint)| joint.name == *name).map(|(j, joint)| (j, joint.twist()))
     };
-    let rotary: Vec<(usize, Twist<f64>)> =
-        commands_of(machine, JointKind::Revolute).iter().filter_map(dyad).take(2).collect();
+    let rotary: Vec<(usize, Twist<f64>)> = rotary_commands(machine).iter().filter_map(dyad).take(2).collect();
     let by_angle = Width::Harmonics {
         mean: 60.0 * urad,
         cos: vec![24.0 * urad],
@@ -81,4 +72,16 @@ pub fn paper_plant(machine: &Machine, seed: u64) -> Plant {
         let wave = |k: usize| (3.0 * c + phases[k]).cos() + (5.0 * a + phases[3 + k]).sin();
         Twist::new(Vec3([0, 1, 2].map(|k| 2.5 * um * wave(k) / 3f64.sqrt())), Vec3([0.0; 3]))
     })
+}
+
+fn rotary_commands(machine: &Machine) -> Vec<usize> {
+    let commands = 0..machine.commands().len();
+    commands.filter(|c| machine.command_joint(*c).kind == JointKind::Revolute).collect()
+}
+
+/// A standard normal number (Box and Muller).
+fn normal(rng: &mut StdRng) -> f64 {
+    let u: f64 = rng.random_range(f64::MIN_POSITIVE..1.0);
+    let v: f64 = rng.random_range(0.0..std::f64::consts::TAU);
+    (-2.0 * u.ln()).sqrt() * v.cos()
 }

@@ -6,9 +6,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::curves::{column, product};
+use super::marginal::gram;
 use super::score::Rows;
-use super::search::Active;
-use super::space::gram;
+use super::search::ModelTerm;
 use crate::effects::{Candidate, Place};
 use crate::feature::{Feature, Samples};
 use crate::lie::Twist;
@@ -32,14 +32,19 @@ pub(super) const EARLY: [f64; 3] = [0.003, 0.01, 0.03];
 pub(super) const MOST_DIRECTIONS: usize = 3;
 
 /// Whitened columns of the shape of an effect, each times what its coefficient may be.
-pub(super) fn columns(rows: &Rows, candidate: &Candidate, active: &Active) -> DMatrix<f64> {
-    let curves = curves(rows, candidate, &active.score.parameters);
-    whitened(rows, answers(rows, candidate, active), curves, PART * amplitude(active)).white
+pub(super) fn columns(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> DMatrix<f64> {
+    let curves = curves(rows, candidate, &in_model.score.parameters);
+    whitened(rows, answers(rows, candidate, in_model), curves, PART * amplitude(in_model)).white
 }
 
 /// Columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
 /// recording, nobody knows from which side it came nor how far. As large as the effect itself; `answers`: to its motion.
-pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active, answers: Vec<Vec<f64>>) -> Columns {
+pub(super) fn initial_conditions(
+    rows: &Rows,
+    candidate: &Candidate,
+    in_model: &ModelTerm,
+    answers: Vec<Vec<f64>>,
+) -> Columns {
     let stretches = &rows.linear.samples;
     let mut curves: Vec<Vec<f64>> = Vec::new();
     let with_history = candidate.features.iter().filter(|f| f.needs_history());
@@ -67,7 +72,7 @@ pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active, answer
     // Machines that stand before a recording may have turned round just there.
     let turned: Vec<Samples> = stretches.iter().map(Samples::turned_before).collect();
     for feature in candidate.features.iter().filter(|f| f.needs_history()) {
-        let parameters = &active.score.parameters;
+        let parameters = &in_model.score.parameters;
         let (with, without) = (feature.over(&turned, parameters), feature.over(stretches, parameters));
         let change: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
         let mut first = 0;
@@ -80,12 +85,12 @@ pub(super) fn states(rows: &Rows, candidate: &Candidate, active: &Active, answer
             }
         }
     }
-    whitened(rows, answers, curves, amplitude(active))
+    whitened(rows, answers, curves, amplitude(in_model))
 }
 
 /// Norm of what an effect does to the whitened rows.
-fn amplitude(active: &Active) -> f64 {
-    (&active.columns * &active.solution).norm()
+fn amplitude(in_model: &ModelTerm) -> f64 {
+    (&in_model.columns * &in_model.solution).norm()
 }
 
 /// Columns that noise does not hide, each as long as it may be.
@@ -240,9 +245,9 @@ fn index_of(x: &[f64], extreme: impl Fn(f64, f64) -> f64) -> Option<usize> {
 }
 
 /// Answers of the readings to each direction of the effect.
-pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
+pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Vec<f64>> {
     let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();
-    for part in candidate.coefficients[..active.score.coefficients].iter().flat_map(|c| &c.parts) {
+    for part in candidate.coefficients[..in_model.score.coefficients].iter().flat_map(|c| &c.parts) {
         let is_known = distinct.iter().any(|(slot, d)| *slot == part.slot && *d == part.direction);
         if !is_known {
             distinct.push((part.slot, part.direction));
@@ -252,15 +257,15 @@ pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, active: &Active) -
 }
 
 /// The same, or of many directions to the mixture of them that was found.
-pub(super) fn answers(rows: &Rows, candidate: &Candidate, active: &Active) -> Vec<Vec<f64>> {
-    let each = each_answer(rows, candidate, active);
+pub(super) fn answers(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Vec<f64>> {
+    let each = each_answer(rows, candidate, in_model);
     if each.len() <= MOST_DIRECTIONS {
         return each;
     }
-    let used = &candidate.coefficients[..active.score.coefficients];
-    let units = rows.units(candidate, &active.score.parameters);
+    let used = &candidate.coefficients[..in_model.score.coefficients];
+    let units = rows.units(candidate, &in_model.score.parameters);
     let mut mixture = vec![0.0; rows.residual.len()];
-    for ((coefficient, unit), x) in used.iter().zip(&units).zip(active.solution.iter()) {
+    for ((coefficient, unit), x) in used.iter().zip(&units).zip(in_model.solution.iter()) {
         for part in &coefficient.parts {
             let answer = rows.answer(part.slot, part.direction);
             mixture.iter_mut().zip(answer.iter()).for_each(|(sum, a)| *sum += unit * x * a);

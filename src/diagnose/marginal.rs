@@ -9,7 +9,7 @@ use super::panel::{Panel, WIDTH, add_along, take_away};
 
 /// The precision of whitened rows after columns with Gaussian priors have been marginalised: `M = I - W Wᵀ`.
 #[derive(Clone, Default)]
-pub(super) struct Space {
+pub(super) struct Marginal {
     /// `W`, shared by the spaces that grew from this one.
     panels: Vec<Arc<Panel>>,
 }
@@ -17,14 +17,14 @@ pub(super) struct Space {
 /// Readings that tell no more of a parameter than this part of what was known beforehand tell nothing.
 const UNTOLD: f64 = 1e-9;
 
-impl Space {
+impl Marginal {
     /// From whitened columns, each times its prior standard deviation.
     pub fn new(columns: DMatrix<f64>) -> Self {
         let used: Vec<usize> =
             (0..columns.ncols()).filter(|c| columns.column(*c).norm_squared() > 1e-20).collect();
         let columns = columns.select_columns(&used);
         if columns.ncols() == 0 {
-            return Space::default();
+            return Marginal::default();
         }
         let qr = columns.qr();
         let (q, r) = (qr.q(), qr.r());
@@ -37,18 +37,18 @@ impl Space {
             let s = svd.singular_values[*j];
             column.scale_mut((s * s / (1.0 + s * s)).sqrt());
         }
-        Space::default().and(&(turn.transpose() * q.transpose()))
+        Marginal::default().and(&(turn.transpose() * q.transpose()))
     }
 
     /// With more columns of `W`, given row by row.
     fn and(&self, transposed: &DMatrix<f64>) -> Self {
         let added = Panel::of_transposed(transposed).into_iter().map(Arc::new);
-        Space { panels: self.panels.iter().cloned().chain(added).collect() }
+        Marginal { panels: self.panels.iter().cloned().chain(added).collect() }
     }
 
     /// On the blocks of a level, as `reduce` puts a panel together.
     pub fn reduced(&self, level: usize, reduce: impl Fn(&Panel) -> Panel) -> Self {
-        Space { panels: self.panels.iter().map(|panel| panel.reduced(level, &reduce)).collect() }
+        Marginal { panels: self.panels.iter().map(|panel| panel.reduced(level, &reduce)).collect() }
     }
 
     /// With further columns, each times its prior standard deviation: `M - M C (I + CᵀM C)⁻¹ CᵀM`.
@@ -66,12 +66,12 @@ impl Space {
         self.and(&(back * beside.transpose()))
     }
 
-    /// Logarithm of the evidence of further columns, each times its prior standard deviation, with what is left of `y` beside the space.
-    pub fn worth(&self, columns: &DMatrix<f64>, left: &DVector<f64>, heat: f64) -> f64 {
-        let mut inner = gram(columns, &self.beside(columns)) / heat;
+    /// Logarithm of the evidence of further columns, each times its prior standard deviation, with what is left of `y` beside the marginal.
+    pub fn worth(&self, columns: &DMatrix<f64>, left: &DVector<f64>, overdispersion: f64) -> f64 {
+        let mut inner = gram(columns, &self.beside(columns)) / overdispersion;
         (0..inner.nrows()).for_each(|i| inner[(i, i)] += 1.0);
         let Some(factor) = Cholesky::new(inner) else { return 0.0 };
-        let toward = columns.tr_mul(left) / heat;
+        let toward = columns.tr_mul(left) / overdispersion;
         0.5 * toward.dot(&factor.solve(&toward))
             - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
     }
@@ -104,7 +104,7 @@ impl Space {
         beside
     }
 
-    /// `WᵀC`: what of columns lies in the space.
+    /// `WᵀC`: what of columns lies in the marginal.
     pub fn along(&self, c: &DMatrixView<f64>) -> DMatrix<f64> {
         let mut along = DMatrix::zeros(self.width(), c.ncols());
         self.add_along(0, c, &mut along);
@@ -127,8 +127,8 @@ mod tests {
         let all = DMatrix::from_columns(&[column(0.3) * 3.0, column(0.7), column(1.1) * 1e3]);
         let (first, rest) = (all.columns(0, 1).into_owned(), all.columns(1, 2).into_owned());
         let x = column(0.9);
-        let at_once = Space::new(all.clone()).apply(&x);
-        let in_turn = Space::new(first).with(&rest).apply(&x);
+        let at_once = Marginal::new(all.clone()).apply(&x);
+        let in_turn = Marginal::new(first).with(&rest).apply(&x);
         // M = (I + C Cᵀ)⁻¹, the definition.
         let full = DMatrix::identity(50, 50) + &all * all.transpose();
         let exact = full.lu().solve(&x).expect("regular");
