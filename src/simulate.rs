@@ -8,7 +8,8 @@
 //! | [`Instrument`] | what is read, with noise, resolution and drop-outs |
 //! | [`Recorder`] | the recording as it is written |
 //!
-//! A [`Session`] puts them together; `docs/simulate.md` teaches `kincal simulate`.
+//! [`recording_of`] is the short way to a recording: an instrument reads a plant at given commands. Inside the crate a [`Session`] runs
+//! courses on one clock. `docs/simulate.md` teaches `kincal simulate`, which has them all.
 
 mod all_axes;
 mod commands;
@@ -24,19 +25,18 @@ mod profile;
 mod program_out;
 mod record;
 mod segment;
+mod session;
 mod standard;
 mod turning;
 mod turns;
 
 use std::fmt::Write as _;
-use std::io::Write;
 
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
 use crate::calibration::CalibratedMachine;
 use crate::check::random_command;
-use crate::error::Result;
 use crate::lie::Twist;
 use crate::machine::Machine;
 
@@ -52,6 +52,7 @@ inner! {
     use profile::{Leg, Pace, Profile, ticks};
     use program_out::write_program;
     use record::{Claims, Recorder, Style, Written};
+    use session::{Run, Session, recordings};
     use standard::{Family, Standard};
     use turning::{Balls, Figure, Pointing, Rounding, Turning, Wave};
     use turns::{Sense, Turns, plane_across, plane_of_axes, rest, usual_range};
@@ -61,86 +62,6 @@ pub use instrument::{Instrument, Scatter};
 pub use plant::Plant;
 
 use instrument::normal;
-
-/// One recording of a call: what is run, and what is read meanwhile.
-pub struct Run {
-    /// The motion.
-    pub course: Box<dyn Course>,
-    /// The instrument.
-    pub instrument: Instrument,
-    /// What the header says.
-    pub claims: Claims,
-    /// Whether the course has settled positions with directions of approach.
-    pub directions: bool,
-}
-
-/// Recordings of one call, made one after the other on one clock: play remembers across them.
-pub struct Session<'a> {
-    plant: &'a Plant,
-    runs: &'a [Run],
-    style: &'a Style,
-    pause: f64,
-    seed: u64,
-    state: State,
-    next: usize,
-    later: f64,
-}
-
-impl<'a> Session<'a> {
-    /// Looks where every joint moves first that has play or is keyed on its direction. `pause`: time between two recordings, s; `seed`: of the noise.
-    ///
-    /// # Errors
-    /// Those of the courses and of [`Plant::first_directions`].
-    pub fn new(plant: &'a Plant, runs: &'a [Run], style: &'a Style, pause: f64, seed: u64) -> Result<Self> {
-        let all = runs.iter().map(|run| run.course.samples()).collect::<Result<Vec<_>>>()?;
-        let state = plant.start(plant.first_directions(all.into_iter().flatten())?);
-        Ok(Session { plant, runs, style, pause, seed, state, next: 0, later: 0.0 })
-    }
-
-    /// The same with a clock that begins so many seconds later.
-    pub fn beginning_at(mut self, seconds: f64) -> Self {
-        self.later = seconds;
-        self
-    }
-
-    /// Writes the next recording; `None` behind the last one. `each` is told of every sample.
-    ///
-    /// # Errors
-    /// Those of the course, [`Error::Motion`](crate::Error::Motion) beyond travel, those of the output.
-    pub fn record(&mut self, out: &mut dyn Write, mut each: impl FnMut(&Sample)) -> Result<Option<Written>> {
-        let Some(run) = self.runs.get(self.next) else { return Ok(None) };
-        let mut recorder = Recorder::new(self.plant.machine(), &run.instrument, self.style, run.directions);
-        out.write_all(recorder.head(&run.claims).as_bytes()).map_err(|e| crate::error::Error::file("", e))?;
-        let mut rng = noise_of(self.seed, self.next as u64);
-        let mut last = 0.0;
-        for sample in run.course.samples()? {
-            let sample = sample?;
-            recorder.take(self.plant, &mut self.state, &sample, self.later, &mut rng, out)?;
-            each(&sample);
-            last = sample.time;
-        }
-        // Each recording starts on a whole second.
-        self.later = (self.later + last + self.pause).ceil();
-        self.next += 1;
-        Ok(Some(recorder.written().clone()))
-    }
-}
-
-/// Recordings of one call as texts, a minute apart.
-///
-/// # Errors
-/// As [`Session::record`].
-pub fn recordings(plant: &Plant, runs: &[Run], style: &Style, seed: u64) -> Result<Vec<String>> {
-    let mut session = Session::new(plant, runs, style, 60.0, seed)?;
-    let mut texts = Vec::new();
-    loop {
-        let mut text = Vec::new();
-        if session.record(&mut text, |_| ())?.is_none() {
-            return Ok(texts);
-        }
-        texts.push(String::from_utf8_lossy(&text).into_owned());
-    }
-}
 
 /// Deviations of every dyad drawn from the machine's tolerances (normal), times `size`.
 pub fn random_deviations(machine: &Machine, size: f64, seed: u64) -> Vec<Twist<f64>> {
@@ -160,7 +81,7 @@ pub fn random_commands(machine: &Machine, count: usize, seed: u64) -> Vec<Vec<f6
 
 /// A recording of `machine` in the form that kincal reads, in m and rad; `extra_header` goes in as it is, one line each.
 ///
-/// The short way for tests: the header says nothing of the instrument but its kind, and samples follow each other by 10 ms.
+/// The header says nothing of the instrument but its kind, and samples follow each other by 10 ms.
 pub fn recording(
     machine: &CalibratedMachine,
     instrument: &Instrument,

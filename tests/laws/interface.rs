@@ -79,7 +79,7 @@ fn there_and_back<T: Serialize + DeserializeOwned>(result: &T) -> serde_json::Va
 /// A mill whose X has play, seen by a tracker on two paths to and fro along every axis.
 fn recording(machine: &Machine) -> Recording {
     let faults = r#"Faults(units: (length: um, angle: arcsec), backlash: [(joint: "x", width: 12)],
-        deviations: [(frame: "z", d: (0, 0, 0, 20, -15, 0))])"#;
+        deviations: [(frame: "z", w: (20, -15, 0))])"#;
     let faults = Faults::parse("faults.ron", faults, machine).unwrap_or_else(|e| panic!("{e}"));
     let plant = Plant::new(&CalibratedMachine::nominal(machine.clone())).with_faults(&faults);
     let path = |k: usize| {
