@@ -179,7 +179,7 @@ fn gross_outliers_are_told_and_do_not_bend_the_fit() {
         assert_eq!(fit.down_weighted, 6, "{loss:?}");
         assert_eq!(fit.suspects.len(), 6);
         assert!(fit.suspects.iter().all(|s| s.residual > 4e-3 && s.weight < 0.5));
-        assert!(fit.suspects.iter().all(|s| (s.line - head) % 50 == 0), "{:?}", fit.suspects);
+        assert!(fit.suspects.iter().all(|s| (s.line - head).is_multiple_of(50)), "{:?}", fit.suspects);
         let (worst, _) = worst(&truth, &fit);
         assert!(worst < 6.0, "{loss:?}: off by {worst:.2} standard errors");
     }
