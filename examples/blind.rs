@@ -1,9 +1,9 @@
 //! The blind harness as a command: writes cases whose effects nobody knows but `answers.json`, and judges the engine on them.
 //!
 //! ```text
-//! cargo run --release --example blind -- --write DIR --kind standard --count 40 --seed 1
-//! cargo run --release --example blind -- --judge DIR --kind standard
-//! cargo run --release --example blind -- --report docs/benchmarks.md --count 200 --seed 1
+//! cargo run --release --features measure --example blind -- --write DIR --kind standard --count 40 --seed 1
+//! cargo run --release --features measure --example blind -- --judge DIR --kind standard
+//! cargo run --release --features measure --example blind -- --report docs/benchmarks.md --count 200 --seed 1
 //! ```
 
 #[path = "../tests/blind/mod.rs"]
@@ -179,7 +179,7 @@ fn report(arguments: &Arguments) -> Result<String, String> {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "Written by `cargo run --release --example blind -- --report docs/benchmarks.md --count {count} --seed {seed}`.\n"
+        "Written by `cargo run --release --features measure --example blind -- --report docs/benchmarks.md --count {count} --seed {seed}`.\n"
     );
     let made = both(&folder, &machine_folder(arguments), &engine, count, seed, &mut out);
     let _ = std::fs::remove_dir_all(&folder);

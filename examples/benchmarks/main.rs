@@ -1,9 +1,9 @@
 //! Measures what the documents speak of, and writes it to `docs/benchmarks.md`, a section at a time.
 //!
 //! ```text
-//! cargo run --release --example benchmarks -- --list
-//! cargo run --release --example benchmarks -- --report docs/benchmarks.md
-//! cargo run --release --example benchmarks -- --report docs/benchmarks.md --data DIR real-geometry real-axes
+//! cargo run --release --features measure --example benchmarks -- --list
+//! cargo run --release --features measure --example benchmarks -- --report docs/benchmarks.md
+//! cargo run --release --features measure --example benchmarks -- --report docs/benchmarks.md --data DIR real-geometry real-axes
 //! ```
 //!
 //! Without names every section runs that takes minutes at most. Real recordings are other people's: `docs/real-recordings.md` says where
@@ -160,7 +160,7 @@ fn chosen(names: &[String]) -> Outcome<Vec<&'static Section>> {
 /// The command that writes a section, with the reader's folder as DIR.
 fn command(section: &Section) -> String {
     let data = if section.needs_data { " --data DIR" } else { "" };
-    format!("cargo run --release --example benchmarks -- --report docs/benchmarks.md{data} {}", section.name)
+    format!("cargo run --release --features measure --example benchmarks -- --report docs/benchmarks.md{data} {}", section.name)
 }
 
 fn title(what: &str) -> String {

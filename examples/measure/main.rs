@@ -1,11 +1,11 @@
 //! Measurements that no test judges; the data sets stand beside the project, or where `KINCAL_DATA` says.
 //!
 //! ```text
-//! cargo run --release --example measure -- concealment --draws 60 --seed 7
-//! cargo run --release --example measure -- losses
-//! cargo run --release --example measure -- tolerances
-//! cargo run --release --example measure -- terms kuka gravity_compliance@q2,lateral_compliance@q1
-//! cargo run --release --example measure -- columns
+//! cargo run --release --features measure --example measure -- concealment --draws 60 --seed 7
+//! cargo run --release --features measure --example measure -- losses
+//! cargo run --release --features measure --example measure -- tolerances
+//! cargo run --release --features measure --example measure -- terms kuka gravity_compliance@q2,lateral_compliance@q1
+//! cargo run --release --features measure --example measure -- columns
 //! ```
 
 mod columns;

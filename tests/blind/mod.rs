@@ -1,6 +1,6 @@
 //! The blind harness: a generator that shares no feature, motion, effect or simulation code with the library, and a scorer.
 //!
-//! Used by `tests/blind.rs` (reduced) and `examples/blind.rs` (the whole table). From the library it takes the nominal numbers
+//! Used by `tests/engine/blind.rs` (reduced) and `examples/blind.rs` (the whole table). From the library it takes the nominal numbers
 //! of machine files; from the engine only what it says of the recordings.
 #![allow(dead_code)]
 

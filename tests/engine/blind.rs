@@ -1,6 +1,6 @@
 //! The blind harness, reduced: laws of its generator and its scorer, and the engine on a few cases.
 //!
-//! The whole table: `cargo run --release --example blind -- --report docs/benchmarks.md`.
+//! The whole table: `cargo run --release --features measure --example blind -- --report docs/benchmarks.md`.
 
 use std::path::{Path, PathBuf};
 
