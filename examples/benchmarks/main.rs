@@ -160,7 +160,10 @@ fn chosen(names: &[String]) -> Outcome<Vec<&'static Section>> {
 /// The command that writes a section, with the reader's folder as DIR.
 fn command(section: &Section) -> String {
     let data = if section.needs_data { " --data DIR" } else { "" };
-    format!("cargo run --release --features measure --example benchmarks -- --report docs/benchmarks.md{data} {}", section.name)
+    format!(
+        "cargo run --release --features measure --example benchmarks -- --report docs/benchmarks.md{data} {}",
+        section.name
+    )
 }
 
 fn title(what: &str) -> String {

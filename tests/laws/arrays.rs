@@ -61,8 +61,11 @@ fn are_the_same(arrays: &Recording, file: &Recording) {
     assert!(found.iter().map(|c| c.len).sum::<usize>() > 0, "nothing was compared");
 }
 
+/// A recording from arrays, the lines of its head, and its columns.
+type Kind = (Arrays, Vec<String>, Vec<(String, Vec<f64>)>);
+
 /// Every kind of measurement: the arrays, and the lines and columns of the same file.
-fn kinds(machine: &Machine, random: &mut Random) -> Vec<(Arrays, Vec<String>, Vec<(String, Vec<f64>)>)> {
+fn kinds(machine: &Machine, random: &mut Random) -> Vec<Kind> {
     let columns = |names: &[&str], rows: &[Vec<f64>]| -> Vec<(String, Vec<f64>)> {
         names.iter().map(|name| name.to_string()).zip(rows.iter().cloned()).collect()
     };
@@ -101,7 +104,7 @@ fn kinds(machine: &Machine, random: &mut Random) -> Vec<(Arrays, Vec<String>, Ve
     all.push((
         Arrays::absolute_distance(&r),
         head(&["measurement: distance"]),
-        columns(&["r[m]"], &[r.clone()]),
+        columns(&["r[m]"], std::slice::from_ref(&r)),
     ));
 
     let s = column(random);
