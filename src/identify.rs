@@ -52,7 +52,7 @@ use crate::lie::{Pose, Twist};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::units::Rms;
-use crate::variation::{Directions, MOST_AXES, Variation, Varying};
+use crate::variation::{Variation, Varying};
 use crate::wording;
 use evidence::Sizes;
 use information::Information as Info;
