@@ -102,7 +102,7 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
                 along(&machine, dh, joint, 2e-5 * f64::from(directions[*c]))
             })
         };
-        let recordings = open(&machine, &record(&machine, &path(&machine, 400), &wrong));
+        let recordings = open(&machine, &record(&machine, &path(&machine, 200), &wrong));
         let varying = Varying { directions: Some(Directions::new(axes.clone())), terms: Vec::new() };
         // Dead bands of nothing: the path is exact.
         let model = ErrorModel::default()
