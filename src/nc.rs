@@ -38,6 +38,10 @@ mod fault;
 mod modes;
 mod token;
 
+mod vocabulary;
+
+mod dialects;
+
 // A line and its pieces.
 mod codes;
 mod number;
@@ -56,6 +60,8 @@ mod program;
 
 // What stays in force from block to block.
 mod axes;
+mod unfollowed;
+
 mod motion;
 
 mod effects;
@@ -71,4 +77,5 @@ pub use number::Number;
 pub use program::{LONGEST_LINE, Program};
 pub use state::State;
 pub use token::{Kind, Token};
+pub use unfollowed::{Unfollowed, Unknown};
 pub use words::{How, Value, Word};

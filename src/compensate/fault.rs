@@ -1,6 +1,7 @@
 //! Why a program cannot be corrected as it stands, and the mend for each.
 
 use crate::error::Fault;
+use crate::nc::Unknown;
 use crate::wording::count;
 
 /// A block whose correction matters and cannot be written.
@@ -80,6 +81,20 @@ pub enum CompensateFault {
         /// Work offsets without known numbers, likewise.
         offsets: Vec<(String, usize)>,
     },
+    /// A piece of a block whose meaning is not known.
+    #[error("{}", unfollowed(*what, text))]
+    NotFollowed {
+        /// What kind of piece it is.
+        what: Unknown,
+        /// As written.
+        text: String,
+    },
+    /// An M code of the machine's builder in a block that moves or changes the tool.
+    #[error("what the axes do at `{code}` is not known, and this block moves or changes the tool")]
+    UnknownFunction {
+        /// As written.
+        code: String,
+    },
     /// A frame that is not followed.
     #[error("`{what}` changes what coordinates mean in a way that is not followed")]
     Frame {
@@ -126,6 +141,21 @@ fn without(axes: &[String]) -> String {
         return String::new();
     }
     format!(": the program has not placed {} before it", axes.join(", "))
+}
+
+/// What is not followed, and why that matters.
+fn unfollowed(what: Unknown, text: &str) -> String {
+    match what {
+        Unknown::Code => format!("what `{text}` does to axes and coordinates is not followed"),
+        Unknown::Function => format!("`{text}` changes what moves mean in a way that is not followed"),
+        Unknown::Axis => format!("`{text}` names an axis that the machine does not have"),
+        Unknown::Address => format!("`{text}` is no word that is followed"),
+        Unknown::Name => format!("`{text}` is no name that is followed"),
+        Unknown::Parameter => format!("`{text}` writes what the control itself goes by"),
+        Unknown::Text => {
+            format!("`{text}` is no word: no control reads it as it stands, or each in its own way")
+        }
+    }
 }
 
 /// `the lengths of tools 3 (line 8) and 7 (line 20), work offset G55 (line 8)`.
@@ -178,6 +208,22 @@ impl Fault for CompensateFault {
                     axes.join(", "),
                     starts.join(", ")
                 )
+            }
+            NotFollowed { what: Unknown::Axis, .. } => {
+                "give the calibrated file of the machine that the program is for, or take the word out".into()
+            }
+            NotFollowed { what: Unknown::Parameter, .. } => {
+                "put it before the program, and say in the set-up what it sets (docs/compensate.md)".into()
+            }
+            NotFollowed { what: Unknown::Text, .. } => "write words as letter and number, without blanks between".into(),
+            NotFollowed { what: Unknown::Address, .. } => {
+                "a variable: declare it (DEF); anything else: let the CAM system do without (docs/compensate.md#followed)".into()
+            }
+            NotFollowed { .. } => {
+                "let the CAM system write the block without it (docs/compensate.md#followed says what is followed)".into()
+            }
+            UnknownFunction { code } => {
+                format!("say which axes it moves: --setup FILE.ron with `m_codes: {{\"{code}\": []}}`, or put it into a block of its own")
             }
             OtherMotion { .. } => "let the CAM system write it as G0, G1, G2, G3".into(),
             UnknownTool { tool } => in_setup(&tools_field([tool.as_str()].into_iter())),

@@ -18,7 +18,7 @@ use super::tool::Tool;
 use super::ways::Ways;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::nc::{Block, Dialect, How, Kind, Modes, Motion, MotionKind, State};
+use crate::nc::{Block, Dialect, How, Kind, Modes, Motion, MotionKind, State, Step};
 
 /// The state of a program that is followed block by block.
 #[derive(Clone)]
@@ -117,6 +117,10 @@ impl<'a> Interpreter<'a> {
         if step.jumps {
             return refuse(block, 0, CompensateFault::Jump { what: line_text(block) });
         }
+        if let Some(piece) = &step.unfollowed {
+            let text = block.text(&piece.span).chars().take(60).collect();
+            return refuse(block, piece.span.start, CompensateFault::NotFollowed { what: piece.what, text });
+        }
         if step.changes_frame {
             self.change_frame(block)?;
         }
@@ -127,6 +131,7 @@ impl<'a> Interpreter<'a> {
         if step.calls && !(drills && step.motion.is_some()) {
             self.call(block, &mut events)?;
         }
+        self.run_functions(block, &step)?;
         if refers(block, self.dialect) {
             self.refer(block, &mut events);
         }
@@ -140,6 +145,44 @@ impl<'a> Interpreter<'a> {
         }
         self.ended = ends(block);
         Ok(events)
+    }
+
+    /// M codes, tools and positions beside the words of the block, which send axes elsewhere.
+    fn run_functions(&mut self, block: &Block, step: &Step) -> Result<()> {
+        for &index in &step.unknown_functions {
+            let span = &block.words()[index].span;
+            let code = block.text(span).to_ascii_uppercase();
+            match self.control.setup().moved_by(&code) {
+                Some(axes) => {
+                    let moved = |address: &str| axes.iter().any(|axis| axis == address);
+                    let which: Vec<usize> = self
+                        .control
+                        .axes()
+                        .iter()
+                        .enumerate()
+                        .filter(|(_, a)| moved(a.address()))
+                        .map(|(i, _)| i)
+                        .collect();
+                    which.into_iter().for_each(|axis| self.places.lose(axis));
+                }
+                None if step.motion.is_some() || step.changes_tool => {
+                    return refuse(block, span.start, CompensateFault::UnknownFunction { code });
+                }
+                None => self.places.lose_all(),
+            }
+        }
+        if step.changes_tool {
+            // A tool is changed where the machine does that; tables may swing out of its way.
+            self.places.lose_all();
+        }
+        for axis in positioned(block) {
+            let which = self.control.axes().iter().position(|a| a.address() == axis);
+            match which {
+                Some(axis) => self.places.lose(axis),
+                None => self.places.lose_all(),
+            }
+        }
+        Ok(())
     }
 
     /// Modes that this block has changed.
@@ -392,6 +435,16 @@ impl<'a> Interpreter<'a> {
     pub fn ended(&self) -> bool {
         self.ended
     }
+}
+
+/// Axes that the block positions beside its words, `POS[X]=10`.
+fn positioned(block: &Block) -> Vec<String> {
+    let of = |text: String| {
+        let inner = ["POS[", "POSA[", "POSP[", "MOV["].iter().find_map(|start| text.strip_prefix(start))?;
+        inner.split([']', ',']).next().map(|axis| axis.trim().to_string())
+    };
+    let others = block.tokens().iter().filter(|t| t.kind == Kind::Other);
+    others.filter_map(|t| of(block.text(&t.span).to_ascii_uppercase())).collect()
 }
 
 /// What may not stand in a block that moves.

@@ -50,6 +50,8 @@ struct Form {
     tcp_at_start: bool,
     #[serde(default)]
     calls: Vec<String>,
+    #[serde(default)]
+    m_codes: BTreeMap<String, Vec<String>>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -161,6 +163,8 @@ impl Setup {
         form.start = keyed(&form.start);
         form.reference = keyed(&form.reference);
         form.tools = keyed(&form.tools);
+        form.m_codes = keyed(&form.m_codes);
+        form.m_codes.values_mut().flatten().for_each(|axis| *axis = key(axis));
         form.work_offsets = keyed(&form.work_offsets).into_iter().map(|(k, v)| (k, keyed(&v))).collect();
         for list in [&mut form.tcp_on, &mut form.tcp_off, &mut form.calls] {
             list.iter_mut().for_each(|name| *name = key(name));
@@ -242,5 +246,11 @@ impl Setup {
     /// Whether a call of this name is said not to cut.
     pub(super) fn leaves_alone(&self, call: &str) -> bool {
         self.form.calls.iter().any(|name| *name == key(call))
+    }
+
+    /// The axes that an M code of this machine moves, where the set-up says so.
+    pub(super) fn moved_by(&self, code: &str) -> Option<&[String]> {
+        let listed = self.form.m_codes.get(&key(code)).map(Vec::as_slice);
+        listed.or_else(|| self.tcp_by(&key(code)).map(|_| &[][..]))
     }
 }

@@ -72,61 +72,6 @@ fn declares(name: &str) -> bool {
         .contains(&name)
 }
 
-/// Calls that neither move nor call a program of the user.
-pub(super) fn harmless_call(name: &str) -> bool {
-    [
-        "MSG",
-        "CYCLE832",
-        "SETAL",
-        "SETMS",
-        "WORKPIECE",
-        "GROUP_BEGIN",
-        "GROUP_END",
-        "STOPRE",
-        "ORISON",
-        "WRITE",
-        "READ",
-        "DELETE",
-        "WAITM",
-        "WAITMC",
-        "WAITE",
-        "START",
-        "INIT",
-        "CLEARM",
-        "SETM",
-        "COUPON",
-        "COUPOF",
-        "COUPDEF",
-        "COUPDEL",
-        "TRAILON",
-        "TRAILOF",
-        "AXNAME",
-        "GETSELT",
-        "GETT",
-        "MMC",
-        "SETPIECE",
-        "ADIS",
-        "PRIO",
-        "SPI",
-        "GET",
-        "RELEASE",
-        "GETD",
-        "FCTDEF",
-        "TANG",
-        "ENABLE",
-        "DISABLE",
-        "DEBUG",
-        "PRINT",
-        "LOG",
-        "AC",
-        "IC",
-        "DC",
-        "ACP",
-        "ACN",
-    ]
-    .contains(&name)
-}
-
 /// Names of frames: numbers in their block are no targets, and coordinates mean something else behind them.
 pub(super) fn frame(name: &str) -> bool {
     [
@@ -147,25 +92,12 @@ pub(super) fn interpolation(name: &str) -> bool {
     ["CIP", "CT", "ASPLINE", "BSPLINE", "CSPLINE", "POLY", "INVCW", "INVCCW"].contains(&name)
 }
 
-/// Siemens names without arguments that neither move nor call: anything else alone in a block is a program of the user.
-pub(super) fn modal_name(name: &str) -> bool {
+/// Names that say what a block is, whatever the dialect's own list has.
+pub(super) fn structures(name: &str) -> bool {
     frame(name)
         || other_transformation(name)
         || interpolation(name)
         || jumps(name)
+        || by_name(name)
         || declares(name)
-        || MODAL_NAMES.split_ascii_whitespace().any(|known| known == name)
 }
-
-const MODAL_NAMES: &str = "
-    TRAORI TRAFOOF SUPA SUPD COMPON COMPOF COMPCURV COMPCAD COMPSURF COMPPATH SOFT SOFTA BRISK BRISKA DRIVE DRIVEA
-    FFWON FFWOF FNORM FLIN FCUB FPO FENDNORM CFC CFTCP CFIN DIAMON DIAMOF DIAM90 DIAMCYCOF DYNNORM DYNPOS DYNROUGH
-    DYNSEMIFIN DYNFINISH DYNPREC ORIEULER ORIRPY ORIRPY2 ORIVIRT1 ORIVIRT2 ORIMKS ORIWKS ORIAXES ORIVECT ORIPATH
-    ORIPATHS ORIPLANE ORICURVE ORICONCW ORICONCCW ORICONIO ORICONTO ORIC ORID ORIS ORISOF ORISON ORIROTA ORIROTR
-    ORIROTT ORIROTC ORISOLH OSC OSD OSS OSSE OST OSOF CUT2D CUT2DF CUT2DD CUT3DC CUT3DF CUT3DFS CUT3DFF CUTCONON
-    CUTCONOF CUTMOD CDON CDOF CDOF2 KONT KONTC KONTT NORM RTLION RTLIOF UPATH SPATH STOPRE STARTFIFO STOPFIFO
-    FIFOCTRL SBLON SBLOF DISPLON DISPLOF DISPLAY SAVE WALIMON WALIMOF WALCS0 PTP PTPG0 PTPWOC CP LFON LFOF LFTXT LFWP
-    LFPOS TOFFON TOFFOF TOWSTD TOWMCS TOWWCS TOWBCS TOWTCS TOWKCS ECOF PON POF SPON SPOF PONS SON SONS PDELAYON
-    PDELAYOF BAUTO EAUTO BNAT ENAT BTAN ETAN DELDTG SPCON SPCOF FGROUP MSG SETMS SPIF1 SPIF2 FRCM RPLON PAROTOF
-    GEOAX TANGON TANGOF G1ADIS ADIS ADISPOS LEADON LEADOF COLLPAIR CORROF STOLF CTOL OTOL ROTOF ISOCALL PRESETON
-";

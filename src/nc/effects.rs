@@ -2,11 +2,13 @@
 
 use super::axes::{Axes, is_linear};
 use super::block::Block;
-use super::codes::{by_name, frame, harmless_call, interpolation, jumps, modal_name, other_transformation};
+use super::codes::{by_name, frame, interpolation, jumps, other_transformation, structures};
 use super::dialect::Dialect;
-use super::modes::{Distance, Feed, Modes, MotionKind, Plane, Units, Why};
+use super::dialects::vocabulary;
+use super::modes::{Modes, MotionKind, Units, Why};
 use super::motion::Step;
 use super::token::Kind;
+use super::vocabulary::{Action, Vocabulary};
 use super::words::Value;
 
 /// What the numbers of axis words in a block are for.
@@ -33,6 +35,7 @@ pub(super) struct Reading {
 /// The effects of one block on what is in force.
 pub(super) struct Effects<'a> {
     dialect: Dialect,
+    vocabulary: &'static Vocabulary,
     modes: &'a mut Modes,
     axes: &'a mut Axes,
     reading: Reading,
@@ -48,7 +51,7 @@ impl<'a> Effects<'a> {
             probes: false,
             machine_frame: false,
         };
-        Effects { dialect, modes, axes, reading }
+        Effects { dialect, vocabulary: vocabulary(dialect), modes, axes, reading }
     }
 
     /// What the block says beside its axis words.
@@ -102,14 +105,15 @@ impl<'a> Effects<'a> {
                 name if jumps(name) => self.reading.step.jumps = true,
                 name if by_name(name) => self.called(line),
                 "MCALL" => self.modes.modal_call = next.is_some(),
-                name if called && !harmless_call(name) => self.called(line),
+                name if called && !self.vocabulary.has_call(name) => self.called(line),
                 // Alone in its block: a program of the user.
                 name if self.dialect == Dialect::Siemens
                     && !called
                     && index == 0
                     && name.len() > 1
                     && next.is_none()
-                    && !modal_name(name) =>
+                    && !structures(name)
+                    && !self.vocabulary.has_name(name) =>
                 {
                     self.called(line);
                 }
@@ -189,11 +193,17 @@ impl<'a> Effects<'a> {
                 }
                 continue;
             };
-            let tenths = (number.value * 10.0).round();
-            let code = if (0.0..1e6).contains(&tenths) { tenths as u32 } else { u32::MAX };
             match word.address.as_str() {
-                "G" => self.g_code(code, names_axis, block),
-                "M" => self.m_code(code, line),
+                "G" => {
+                    if let Some(action) = self.vocabulary.g(number.value) {
+                        self.act(action, number.value, names_axis, block);
+                    }
+                }
+                "M" => {
+                    if let Some(action) = self.vocabulary.m(number.value) {
+                        self.act(action, number.value, names_axis, block);
+                    }
+                }
                 "T" => self.modes.tool = Some(block.text(&word.value_span)),
                 "D" if self.dialect == Dialect::Siemens => self.offset_number(number.value, line),
                 "H" if self.dialect == Dialect::Rs274 => self.offset_number(number.value, line),
@@ -203,57 +213,44 @@ impl<'a> Effects<'a> {
         }
     }
 
-    fn g_code(&mut self, code: u32, names_axis: bool, block: &Block) {
-        use MotionKind::*;
+    /// What the code of this number does.
+    fn act(&mut self, action: Action, code: f64, names_axis: bool, block: &Block) {
+        use MotionKind::Other;
         let line = block.line();
-        let (rs274, siemens) = (self.dialect == Dialect::Rs274, self.dialect == Dialect::Siemens);
-        let whole = code.is_multiple_of(10);
-        match code {
-            // DIN/ISO at Heidenhain: datum shift, mirror, scale, rotation, tilted plane; call of a cycle.
-            280 | 530 | 540 | 720 | 730 | 800 if !rs274 && !siemens => {
-                self.reading.purpose = Purpose::Nothing;
-                self.reading.step.changes_frame = true;
-                self.axes.lose(line, Why::Frame, |_| true);
+        match action {
+            Action::Nothing | Action::NotFollowed => {}
+            Action::Motion(kind) => self.reading.kind = Some(kind),
+            Action::MotionOfAxes(kind) => {
+                if names_axis {
+                    self.reading.kind = Some(kind);
+                }
             }
-            790 if !rs274 && !siemens => self.called(line),
-            0 => self.reading.kind = Some(Rapid),
-            10 => self.reading.kind = Some(Linear),
-            20 => self.reading.kind = Some(ArcCw),
-            30 => self.reading.kind = Some(ArcCcw),
-            22 | 32 | 50..=53 | 62 if names_axis && !siemens => self.reading.kind = Some(Other),
-            330..=349 | 3310 | 3320 => self.reading.kind = Some(Other),
-            40 => self.reading.purpose = Purpose::Nothing,
-            730 | 740 | 760 | 810..=890 if rs274 => {
-                self.reading.kind = Some(if code == 760 && !names_axis { Other } else { Cycle })
-            }
-            800 if rs274 => self.reading.kind = Some(Unstated),
-            310..=319 | 380..=385 if rs274 => {
+            // Threads of LinuxCNC name no axis.
+            Action::Cycle if code == 76.0 && !names_axis => self.reading.kind = Some(Other),
+            Action::Cycle => self.reading.kind = Some(MotionKind::Cycle),
+            Action::Probe => {
                 self.reading.kind = Some(Other);
                 self.reading.probes = true;
             }
-            170 => self.modes.plane = Some(Plane::Xy),
-            180 => self.modes.plane = Some(Plane::Zx),
-            190 => self.modes.plane = Some(Plane::Yz),
-            200 | 7000 => self.measured_in(Units::Inch, line),
-            210 | 7100 => self.measured_in(Units::Millimetre, line),
-            // G70 and G71 with P and Q are cycles of lathes.
-            700 | 710 if !block.has_word("P") => {
-                self.measured_in(if code == 700 { Units::Inch } else { Units::Millimetre }, line)
+            Action::NoTargets => self.reading.purpose = Purpose::Nothing,
+            Action::Plane(plane) => self.modes.plane = Some(plane),
+            Action::Units(units) => self.measured_in(units, line),
+            Action::UnitsUnlessP(units) => {
+                if !block.has_word("P") {
+                    self.measured_in(units, line);
+                }
             }
-            900 => self.modes.distance = Some(Distance::Absolute),
-            910 => self.modes.distance = Some(Distance::Incremental),
-            930 => self.modes.feed = Some(Feed::InverseTime),
-            940 => self.modes.feed = Some(Feed::PerMinute),
-            950 => self.modes.feed = Some(Feed::PerRevolution),
-            430 | 440 => {
+            Action::Distance(distance) => self.modes.distance = Some(distance),
+            Action::Feed(feed) => self.modes.feed = Some(feed),
+            Action::Length => {
                 self.modes.tool_length = Some(true);
                 self.length_changed(line);
             }
-            434 | 435 | 2340 if !siemens => {
+            Action::TcpWithLength => {
                 self.modes.tool_length = Some(true);
                 self.transform(true, line);
             }
-            490 if !siemens => {
+            Action::NoLength => {
                 if self.modes.tool_centre_point == Some(true) {
                     self.transform(false, line);
                 }
@@ -262,74 +259,43 @@ impl<'a> Effects<'a> {
                     self.length_changed(line);
                 }
             }
-            530 | 1530 => self.reading.machine_frame = true,
-            531 | 536 if rs274 => self.axes.lose(line, Why::Frame, |_| true),
-            580 | 590 if siemens => {
-                self.reading.step.changes_frame = true;
-                self.reading.purpose = Purpose::Nothing;
-                self.frame_moved(block, line);
+            Action::Tcp(on) => self.transform(on, line),
+            Action::MachineFrame => self.reading.machine_frame = true,
+            Action::Offset => self.offset_named(format!("G{code}"), line),
+            Action::OffsetByP => {
+                let place = block.word_text("P").map_or(String::new(), |p| format!(" P{p}"));
+                self.offset_named(format!("G{code}{place}"), line);
             }
-            540..=593 if whole || rs274 => {
-                let place = (rs274 && code == 541).then(|| block.word_text("P")).flatten();
-                let name =
-                    if whole { format!("G{}", code / 10) } else { format!("G{}.{}", code / 10, code % 10) };
-                self.offset_named(place.map_or(name.clone(), |p| format!("{name} P{p}")), line);
-            }
-            5000 | 5050..=5990 if siemens && whole => self.offset_named(format!("G{}", code / 10), line),
-            280..=309 if rs274 => self.reading.purpose = Purpose::Reference,
-            740 | 750 | 7510 if siemens => self.reading.purpose = Purpose::Reference,
-            250 | 260 if siemens => self.reading.purpose = Purpose::Nothing,
-            1100..=1120 if siemens => self.reading.purpose = Purpose::Nothing,
-            100 if rs274 => {
-                self.reading.purpose = Purpose::Nothing;
-                self.reading.step.changes_frame = true;
-                self.frame_moved(block, line);
-            }
-            650..=670 if rs274 => {
-                self.reading.purpose = Purpose::Nothing;
-                // G66 calls behind every block that moves, until G67.
-                self.modes.modal_call = code / 10 == 66;
-                if code != 670 {
-                    self.called(line);
-                }
-            }
-            920 if names_axis && !siemens => {
+            Action::Reference => self.reading.purpose = Purpose::Reference,
+            Action::Preset if !names_axis => {}
+            Action::Preset => {
                 self.reading.purpose = Purpose::Preset;
                 self.reading.step.changes_frame = true;
             }
-            921..=923 if !siemens => {
+            Action::FrameUnlessS if block.has_word("S") => {}
+            Action::Frame | Action::FrameUnlessS => {
+                self.reading.purpose = Purpose::Nothing;
+                self.reading.step.changes_frame = true;
+                self.frame_moved(block, line);
+            }
+            Action::FrameOfAll => {
+                self.reading.purpose = Purpose::Nothing;
                 self.reading.step.changes_frame = true;
                 self.axes.lose(line, Why::Frame, |_| true);
             }
-            520 if rs274 => {
-                self.reading.purpose = Purpose::Nothing;
-                self.reading.step.changes_frame = true;
-                self.frame_moved(block, line);
-            }
-            // With S, G50 is a limit of the spindle.
-            500 if block.has_word("S") => {}
-            500 | 501 | 510 | 511 | 680..=694 | 2540 | 2550 if rs274 => {
-                self.reading.purpose = Purpose::Nothing;
-                self.reading.step.changes_frame = true;
-                self.frame_moved(block, line);
-            }
-            _ => {}
-        }
-    }
-
-    fn m_code(&mut self, code: u32, line: usize) {
-        match code {
-            60 => self.tool_changed(line),
-            970 | 980 if self.dialect == Dialect::Rs274 => {
+            Action::Call => {
                 self.reading.purpose = Purpose::Nothing;
                 self.called(line);
             }
-            990 if self.dialect == Dialect::Rs274 => self.reading.step.jumps = true,
-            1280 if self.dialect == Dialect::Heidenhain => self.transform(true, line),
-            1290 if self.dialect == Dialect::Heidenhain => self.transform(false, line),
-            910 | 920 if self.dialect == Dialect::Heidenhain => self.reading.machine_frame = true,
-            890 | 990 if self.dialect == Dialect::Heidenhain => self.called(line),
-            _ => {}
+            Action::ModalCall(on) => {
+                self.reading.purpose = Purpose::Nothing;
+                self.modes.modal_call = on;
+                if on {
+                    self.called(line);
+                }
+            }
+            Action::Jump => self.reading.step.jumps = true,
+            Action::ToolChange => self.tool_changed(line),
         }
     }
 
@@ -366,6 +332,7 @@ impl<'a> Effects<'a> {
     }
 
     fn tool_changed(&mut self, line: usize) {
+        self.reading.step.changes_tool = true;
         self.axes.lose(line, Why::Tool, is_linear);
     }
 

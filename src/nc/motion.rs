@@ -1,6 +1,7 @@
 //! What one block does: where it moves, and what else it sets going.
 
 use super::modes::MotionKind;
+use super::unfollowed::Unfollowed;
 
 /// A block that moves. Lists are in the order of the addresses given to [`State::new`](super::State::new).
 #[derive(Clone, Debug, PartialEq)]
@@ -30,4 +31,10 @@ pub struct Step {
     pub calls: bool,
     /// The next block need not be the next line: `IF`, `GOTO`, `WHILE`, `FN 9`. State is followed in the order of lines.
     pub jumps: bool,
+    /// Another tool comes, for which the axes may go elsewhere.
+    pub changes_tool: bool,
+    /// What else stands in it and is not followed.
+    pub unfollowed: Option<Unfollowed>,
+    /// Its M codes that the dialect does not have: indices of words. What they do is a matter of the machine.
+    pub unknown_functions: Vec<usize>,
 }

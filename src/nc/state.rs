@@ -1,12 +1,17 @@
 //! What stays in force from block to block, and where a block moves.
 
+use std::collections::BTreeSet;
+
 use super::axes::{Axes, is_linear};
 use super::block::Block;
 use super::dialect::Dialect;
+use super::dialects::vocabulary;
 use super::effects::{Effects, Purpose, Reading};
 use super::fault::NcFault;
 use super::modes::{Coordinate, Modes, MotionKind, Why};
 use super::motion::{Motion, Step};
+use super::token::Kind;
+use super::unfollowed::{Known, unknown_functions};
 use super::words::Word;
 use crate::error::Result;
 
@@ -16,6 +21,8 @@ pub struct State {
     dialect: Dialect,
     axes: Axes,
     modes: Modes,
+    /// Names that the program has declared as variables.
+    declared: BTreeSet<String>,
 }
 
 impl State {
@@ -23,7 +30,7 @@ impl State {
     pub fn new(dialect: Dialect, addresses: impl IntoIterator<Item = impl Into<String>>) -> Self {
         let addresses: Vec<String> =
             addresses.into_iter().map(|a| Into::<String>::into(a).to_ascii_uppercase()).collect();
-        State { dialect, axes: Axes::new(addresses), modes: Modes::default() }
+        State { dialect, axes: Axes::new(addresses), modes: Modes::default(), declared: BTreeSet::new() }
     }
 
     /// The addresses that are followed.
@@ -70,8 +77,33 @@ impl State {
             let address = self.axes.addresses()[axis].clone();
             return Err(block.fault(at, NcFault::TwiceInBlock { address, first }));
         }
+        self.declare(block);
+        let known = Known {
+            dialect: self.dialect,
+            vocabulary: vocabulary(self.dialect),
+            axes: self.axes.addresses(),
+            declared: &self.declared,
+            targets: reading.purpose != Purpose::Nothing,
+        };
+        reading.step.unfollowed = known.first_unfollowed(block);
+        reading.step.unknown_functions = unknown_functions(block, known.vocabulary);
         self.place(block, &words, &mut reading);
         Ok(reading.step)
+    }
+
+    /// Takes up what a declaration names.
+    fn declare(&mut self, block: &Block) {
+        let mut tokens = block.tokens().iter();
+        let declares = |name: &str| matches!(name, "DEF" | "REDEF" | "PROC" | "DECLARE");
+        if !tokens.any(|t| t.kind == Kind::Name && declares(&block.name(t))) {
+            return;
+        }
+        for token in tokens.filter(|t| t.kind == Kind::Other) {
+            let text = block.text(&token.span).to_ascii_uppercase();
+            let names =
+                text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').filter(|name| name.len() > 1);
+            self.declared.extend(names.map(String::from));
+        }
     }
 
     /// The words of the block that name axis after axis.
