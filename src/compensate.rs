@@ -76,6 +76,7 @@ mod tip_error;
 mod unseen;
 
 mod corrector;
+mod envelope;
 
 mod words;
 
@@ -85,6 +86,7 @@ mod pass;
 mod lines;
 
 mod cycle;
+mod feed;
 mod straight;
 
 mod curve;
@@ -102,9 +104,9 @@ use std::path::Path;
 
 pub use fault::CompensateFault;
 pub use model::Model;
-pub use options::CompensateOptions;
+pub use options::{CompensateOptions, UnknownAxes};
 pub use report::{
-    Listed, MOST_LISTED, OutOfTravel, Report, Reversal, SingularBlock, UnknownWay, Unreached, Unseen,
+    Listed, MOST_LISTED, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, Unseen,
     UnseenPattern, UnseenPiece, Worst,
 };
 pub use setup::{Setup, ToolAxis};

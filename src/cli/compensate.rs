@@ -4,7 +4,9 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
-use crate::compensate::{CompensateOptions, Listed, Report, Setup, UnknownWay, Worst, compensate};
+use crate::compensate::{
+    CompensateOptions, Listed, Report, Setup, UnknownAxes, UnknownWay, Worst, compensate,
+};
 use crate::inverse::Mode;
 use crate::nc::Dialect;
 use crate::units::{Quantity, Unit};
@@ -32,12 +34,18 @@ pub(crate) struct Args {
     /// Subdivide straight moves that would leave more than this between their ends
     #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
     split: Option<f64>,
+    /// Largest correction of the tip; without this, ten times what the machine's tolerances make
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
+    max_correction: Option<f64>,
     /// Digits behind the point
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=9))]
     decimals: Option<u8>,
     /// What is corrected, where it is not what the machine has joints for
     #[arg(long, value_enum)]
     mode: Option<ModeWord>,
+    /// Moves that need the word of an axis of which it is not known where it stands: without this, rapids are kept
+    #[arg(long, value_enum)]
+    unknown: Option<UnknownWord>,
     /// The control, where the program's first lines do not say it
     #[arg(long, value_enum)]
     dialect: Option<DialectWord>,
@@ -53,6 +61,14 @@ enum ModeWord {
     Axis,
     /// The whole pose
     Pose,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum UnknownWord {
+    /// Refuse the move
+    Refuse,
+    /// Leave it as it is, and tell
+    Keep,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -99,10 +115,15 @@ pub(crate) fn run(args: &Args) -> Outcome {
         decimals: args.decimals.map(usize::from),
         arcs: args.arcs,
         split: args.split,
+        max_correction: args.max_correction,
         mode: args.mode.map(|mode| match mode {
             ModeWord::Position => Mode::Position,
             ModeWord::Axis => Mode::PositionAndAxis,
             ModeWord::Pose => Mode::Pose,
+        }),
+        unknown: args.unknown.map(|unknown| match unknown {
+            UnknownWord::Refuse => UnknownAxes::Refuse,
+            UnknownWord::Keep => UnknownAxes::Keep,
         }),
         dialect: args.dialect.map(|dialect| match dialect {
             DialectWord::Rs274 => Dialect::Rs274,
@@ -270,16 +291,16 @@ fn notes(r: &Report) -> String {
             }
         );
     }
-    if r.out_of_travel.count > 0 {
-        let joints: std::collections::BTreeSet<&str> =
-            r.out_of_travel.first.iter().map(|o| o.joint.as_str()).collect();
-        let joints: Vec<&str> = joints.into_iter().collect();
+    if r.unknown_places.count > 0 {
+        let axes: std::collections::BTreeSet<&str> =
+            r.unknown_places.first.iter().flat_map(|x| x.axes.iter().map(String::as_str)).collect();
+        let axes: Vec<&str> = axes.into_iter().collect();
         let _ = writeln!(
             text,
-            "note: {} out of travel at {}: {}",
-            joints.join(", "),
-            count(r.out_of_travel.count, "block", "blocks"),
-            lines(&r.out_of_travel, |x| x.line)
+            "note: where {} stands is not known at {}, so its share of the correction is left out: {}",
+            axes.join(", "),
+            count(r.unknown_places.count, "move", "moves"),
+            lines(&r.unknown_places, |x| x.line)
         );
     }
     if r.singular.count > 0 {

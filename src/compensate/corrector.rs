@@ -196,6 +196,39 @@ impl<'a> Corrector<'a> {
         Correction { numbers, written: Position::new(q, coordinates), solution }
     }
 
+    /// Axes that the correction of `q` would move if it were known where they stand; only those asked of by `is_asked`.
+    pub fn wants(
+        &self,
+        program: &Interpreter,
+        style: &Style,
+        q: &[f64],
+        is_asked: &dyn Fn(usize) -> bool,
+    ) -> Vec<usize> {
+        let (control, places) = (program.control(), program.places());
+        let mut free = program.free();
+        let asked =
+            |i: &usize| !places.is_placed(*i) && control.axes()[*i].command().is_some() && is_asked(*i);
+        let unplaced: Vec<usize> = (0..places.len()).filter(asked).collect();
+        if unplaced.is_empty() {
+            return unplaced;
+        }
+        // Where a rotary axis stands decides on the correction of all others.
+        let (mut wanted, slides): (Vec<usize>, Vec<usize>) =
+            unplaced.into_iter().partition(|i| control.axes()[*i].is_rotary());
+        wanted.retain(|i| places.is_parked(*i) && !places.is_sure(*i));
+        for command in slides.iter().filter_map(|i| control.axes()[*i].command()) {
+            free[command.0] = true;
+        }
+        // Where they are unknown, what matters is by how much they would be moved.
+        let stands = control.program(q, program.written().program());
+        let moved =
+            control.program(&self.solve_with(&self.model.chain_at(q), program, q, &free).commands, &stands);
+        let half = |i: usize| 0.5 * control.si(i, 10f64.powi(-(style.places(control, i) as i32))).abs();
+        wanted.extend(slides.into_iter().filter(|i| (moved[*i] - stands[*i]).abs() > half(*i)));
+        wanted.sort_unstable();
+        wanted
+    }
+
     fn is_prismatic(&self, command: usize) -> bool {
         self.machine.command_joint(command).kind == JointKind::Prismatic
     }

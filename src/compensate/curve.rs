@@ -41,12 +41,12 @@ pub(super) fn write(
         let q = pass.program().joints(block, &target)?;
         let end = Position::new(q, target);
         pass.advance(line, end.q());
-        let correction = pass.correct(line, end.q(), Some(block), &motion.words);
+        let correction = pass.correct(block, end.q(), Some(&motion.words))?;
         // An axis beside the plane may come back from where it stood before.
         if correction.numbers().iter().all(|n| motion.words[n.axis()].is_none()) {
             pass.restate(block, motion)?;
             pass.put_words(block, motion, &correction)?;
-            pass.arrive(line, end, correction.into_written());
+            pass.arrive(block, end, correction.into_written())?;
             return put(block, out);
         }
     }

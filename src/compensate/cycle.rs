@@ -31,7 +31,8 @@ pub(super) fn write(
     }
     let q = pass.program().joints(block, &target)?;
     pass.advance(line, &q);
-    let mut correction = pass.correct(line, &q, Some(block), &motion.words);
+    pass.need_places(block, motion, &q, &|i| in_plane[i])?;
+    let mut correction = pass.correct(block, &q, Some(&motion.words))?;
     correction.keep(&in_plane);
     let mut coordinates = correction.written().program().to_vec();
     for i in &beside {

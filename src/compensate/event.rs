@@ -26,4 +26,6 @@ pub(super) enum Event {
         /// Whether a cycle runs there.
         drills: bool,
     },
+    /// Numbers for the place where the machine stands: word, axis, and by how much the machine stands elsewhere than meant, m or rad.
+    Preset { words: Vec<(usize, usize, f64)> },
 }

@@ -89,11 +89,40 @@ pub enum CompensateFault {
         /// As written.
         text: String,
     },
+    /// A move that needs axes of which it is not known where they stand.
+    #[error("the correction of this move needs {}, and where {} is not known here", listed(axes), if axes.len() == 1 { "it stands" } else { "they stand" })]
+    UnknownPlace {
+        /// Addresses of the axes.
+        axes: Vec<String>,
+    },
     /// An M code of the machine's builder in a block that moves or changes the tool.
     #[error("what the axes do at `{code}` is not known, and this block moves or changes the tool")]
     UnknownFunction {
         /// As written.
         code: String,
+    },
+    /// A rotary move whose feed would mean something else.
+    #[error(
+        "by its correction this rotary move gets linear words, and F would no longer be degrees per minute"
+    )]
+    RotaryFeed,
+    /// A joint that would leave its travel.
+    #[error("`{joint}` would be sent {} beyond its travel", beyond(*by, *rotary))]
+    OutOfTravel {
+        /// Name of the joint.
+        joint: String,
+        /// How far, m or rad.
+        by: f64,
+        /// Whether it is a rotary one.
+        rotary: bool,
+    },
+    /// A correction so large that the model is likely that of another machine.
+    #[error("the tip would be corrected by {:.3} mm, more than the {:.3} mm that are taken for a correction", by_m * 1e3, bound_m * 1e3)]
+    TooFar {
+        /// By how much, m.
+        by_m: f64,
+        /// The bound, m.
+        bound_m: f64,
     },
     /// A frame that is not followed.
     #[error("`{what}` changes what coordinates mean in a way that is not followed")]
@@ -114,7 +143,9 @@ pub enum CompensateFault {
         what: String,
     },
     /// A block that the operator may leave out.
-    #[error("a block that may be left out moves; what follows depends on whether it does")]
+    #[error(
+        "a block that may be left out moves, or changes what later blocks mean; what follows depends on whether it does"
+    )]
     Skipped,
     /// A tool direction instead of rotary words.
     #[error("`{address}` gives the tool direction as a vector; which joints the control turns is not known")]
@@ -143,6 +174,20 @@ fn without(axes: &[String]) -> String {
     format!(": the program has not placed {} before it", axes.join(", "))
 }
 
+/// A travel that is exceeded, with its unit.
+fn beyond(by: f64, rotary: bool) -> String {
+    if rotary { format!("{:.4} deg", by.to_degrees()) } else { format!("{:.4} mm", by * 1e3) }
+}
+
+/// `X, Y and Z`.
+fn listed(names: &[String]) -> String {
+    match names.split_last() {
+        None => String::new(),
+        Some((last, [])) => last.clone(),
+        Some((last, others)) => format!("{} and {last}", others.join(", ")),
+    }
+}
+
 /// What is not followed, and why that matters.
 fn unfollowed(what: Unknown, text: &str) -> String {
     match what {
@@ -150,7 +195,7 @@ fn unfollowed(what: Unknown, text: &str) -> String {
         Unknown::Function => format!("`{text}` changes what moves mean in a way that is not followed"),
         Unknown::Axis => format!("`{text}` names an axis that the machine does not have"),
         Unknown::Address => format!("`{text}` is no word that is followed"),
-        Unknown::Name => format!("`{text}` is no name that is followed"),
+        Unknown::Name => format!("`{text}` is not followed"),
         Unknown::Parameter => format!("`{text}` writes what the control itself goes by"),
         Unknown::Text => {
             format!("`{text}` is no word: no control reads it as it stands, or each in its own way")
@@ -162,12 +207,8 @@ fn unfollowed(what: Unknown, text: &str) -> String {
 fn unknown(tools: &[(String, usize)], offsets: &[(String, usize)]) -> String {
     let some = |one: &str, many: &str, all: &[(String, usize)]| {
         let each: Vec<String> = all.iter().map(|(name, line)| format!("{name} (line {line})")).collect();
-        let said = match each.split_last() {
-            None => return None,
-            Some((last, [])) => format!("{one} {last}"),
-            Some((last, others)) => format!("{many} {} and {last}", others.join(", ")),
-        };
-        Some(said)
+        let noun = if each.len() == 1 { one } else { many };
+        (!each.is_empty()).then(|| format!("{noun} {}", listed(&each)))
     };
     let tools = some("the length of tool", "the lengths of tools", tools);
     let offsets = some("work offset", "work offsets", offsets);
@@ -222,6 +263,17 @@ impl Fault for CompensateFault {
             NotFollowed { .. } => {
                 "let the CAM system write the block without it (docs/compensate.md#followed says what is followed)".into()
             }
+            RotaryFeed => "program this block in inverse time (G93), or as a rapid move".into(),
+            OutOfTravel { .. } => {
+                "keep the move away from the ends of travel; where the control's zero is not that of the machine file, say so: --setup FILE.ron with `zero` and `work_offsets`".into()
+            }
+            TooFar { .. } => {
+                "check that the calibrated file, units, set-up and program belong together; --max-correction LENGTH allows more".into()
+            }
+            UnknownPlace { axes } => format!(
+                "name {} in this block or before it, or leave such moves as they are with --unknown keep",
+                listed(axes)
+            ),
             UnknownFunction { code } => {
                 format!("say which axes it moves: --setup FILE.ron with `m_codes: {{\"{code}\": []}}`, or put it into a block of its own")
             }

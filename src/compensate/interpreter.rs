@@ -40,6 +40,8 @@ pub(super) struct Interpreter<'a> {
     modal_cycle: Option<String>,
     /// `G90.1`: centres of arcs are absolute.
     absolute_centre: bool,
+    /// The feed in force, and how it is written.
+    feed: Option<(f64, String)>,
     /// Behind M2 or M30.
     ended: bool,
 }
@@ -64,6 +66,7 @@ impl<'a> Interpreter<'a> {
             offset_fault: None,
             modal_cycle: None,
             absolute_centre: false,
+            feed: None,
             ended: false,
         };
         interpreter.begin(setup);
@@ -113,7 +116,23 @@ impl<'a> Interpreter<'a> {
         }
         let before = self.state.modes().clone();
         let step = self.state.apply(block)?;
+        if let Some(mark) = block.tokens().iter().find(|t| t.kind == Kind::Skip)
+            && (changes(&step)
+                || *self.state.modes() != before
+                || has_g(block, 90.1)
+                || has_g(block, 91.1)
+                || ends(block)
+                || refers(block, self.dialect))
+        {
+            return refuse(block, mark.span.start, CompensateFault::Skipped);
+        }
         self.change_modes(block, &before, &mut events);
+        if self.state.modes().feed != before.feed && before.feed.is_some() {
+            self.feed = None;
+        }
+        if let Some(word) = block.words().iter().find(|w| w.address == "F") {
+            self.feed = word.number().map(|feed| (feed, block.text(&word.value_span)));
+        }
         if step.jumps {
             return refuse(block, 0, CompensateFault::Jump { what: line_text(block) });
         }
@@ -122,6 +141,7 @@ impl<'a> Interpreter<'a> {
             return refuse(block, piece.span.start, CompensateFault::NotFollowed { what: piece.what, text });
         }
         if step.changes_frame {
+            events.extend(self.preset(block));
             self.change_frame(block)?;
         }
         if let Some(cycle) = call::modal_of(block) {
@@ -171,9 +191,8 @@ impl<'a> Interpreter<'a> {
                 None => self.places.lose_all(),
             }
         }
-        if step.changes_tool {
-            // A tool is changed where the machine does that; tables may swing out of its way.
-            self.places.lose_all();
+        if step.changes_tool && self.control.setup().moved_by("M6").is_none() {
+            self.leave_slides();
         }
         for axis in positioned(block) {
             let which = self.control.axes().iter().position(|a| a.address() == axis);
@@ -211,6 +230,7 @@ impl<'a> Interpreter<'a> {
             self.control.set_plane(now.plane, self.dialect == Dialect::Siemens);
             changed = true;
         }
+        let in_spindle = self.tool.in_spindle().map(String::from);
         let tool = self.tool.change(block, self.dialect, before, now);
         let offset = now.work_offset.clone().filter(|_| now.work_offset != before.work_offset);
         if let Some(name) = offset {
@@ -219,6 +239,12 @@ impl<'a> Interpreter<'a> {
         }
         if tool {
             self.take_lengths();
+            if self.tool.in_spindle() != in_spindle.as_deref() {
+                self.leave_slides();
+            } else {
+                // Some controls go by the new length at once.
+                self.leave_normal();
+            }
         }
         if changed || tool {
             self.rename();
@@ -263,6 +289,19 @@ impl<'a> Interpreter<'a> {
         }
     }
 
+    /// `G92`: the control gives its numbers to the place where it has been sent, not to the one that is meant; by how much each
+    /// number has to differ for that.
+    fn preset(&self, block: &Block) -> Option<Event> {
+        if self.dialect == Dialect::Siemens || !has_g(block, 92.0) {
+            return None;
+        }
+        let by = |(i, axis): (usize, &super::axis::Axis)| {
+            let word = block.words().iter().position(|w| w.address == axis.address())?;
+            Some((word, i, self.written.program()[i] - self.meant.program()[i]))
+        };
+        Some(Event::Preset { words: self.control.axes().iter().enumerate().filter_map(by).collect() })
+    }
+
     /// A call that is left alone leaves every axis somewhere.
     fn call(&mut self, block: &Block, events: &mut Vec<Event>) -> Result<()> {
         let name = call::name_of(block);
@@ -276,6 +315,13 @@ impl<'a> Interpreter<'a> {
         }
         self.places.lose_all();
         Ok(())
+    }
+
+    /// A tool is changed where the machine does that; the linear axes are there then.
+    fn leave_slides(&mut self) {
+        for (i, _) in self.control.axes().iter().enumerate().filter(|(_, a)| !a.is_rotary()) {
+            self.places.lose(i);
+        }
     }
 
     /// The axis of the tool length is behind a cycle wherever the cycle leaves it.
@@ -426,6 +472,11 @@ impl<'a> Interpreter<'a> {
         &self.written
     }
 
+    /// The feed in force, if one is, and how it is written.
+    pub fn feed(&self) -> Option<(f64, &str)> {
+        self.feed.as_ref().map(|(feed, text)| (*feed, text.as_str()))
+    }
+
     /// Whether centres of arcs are absolute.
     pub fn absolute_centre(&self) -> bool {
         self.absolute_centre
@@ -435,6 +486,16 @@ impl<'a> Interpreter<'a> {
     pub fn ended(&self) -> bool {
         self.ended
     }
+}
+
+/// Whether a step leaves anything otherwise than it was, modes aside.
+fn changes(step: &Step) -> bool {
+    step.motion.is_some()
+        || step.changes_frame
+        || step.calls
+        || step.jumps
+        || step.changes_tool
+        || !step.unknown_functions.is_empty()
 }
 
 /// Axes that the block positions beside its words, `POS[X]=10`.
@@ -449,10 +510,6 @@ fn positioned(block: &Block) -> Vec<String> {
 
 /// What may not stand in a block that moves.
 fn check(block: &Block) -> Result<()> {
-    let skipped = block.tokens().iter().find(|t| t.kind == Kind::Skip);
-    if let Some(token) = skipped {
-        return refuse(block, token.span.start, CompensateFault::Skipped);
-    }
     for token in block.tokens().iter().filter(|t| t.kind == Kind::Other) {
         let text = block.text(&token.span).to_ascii_uppercase();
         if ["POS[", "POSA[", "POSP[", "MOV["].iter().any(|start| text.starts_with(start)) {

@@ -95,8 +95,7 @@ pub(super) fn write(
         if arc.is_some() {
             pass.advance(line, point.q());
         }
-        let words: &[Option<usize>] = if k == own { &motion.words } else { &[] };
-        let correction = pass.correct(line, point.q(), (k == own).then_some(&*block), words);
+        let correction = pass.correct(block, point.q(), (k == own).then_some(&motion.words[..]))?;
         if let (Some(_), Some(tolerance)) = (arc, pass.options().arcs) {
             let left =
                 pass.corrector().error(pass.program().control(), correction.written().q(), point.q()).m();
@@ -125,7 +124,7 @@ pub(super) fn write(
                 put_bytes(form.line(text, k, count).as_bytes(), out)?;
             }
         }
-        pass.arrive(line, point, correction.into_written());
+        pass.arrive(block, point, correction.into_written())?;
     }
     pass.put_in_force(MotionKind::Linear);
     Ok(())

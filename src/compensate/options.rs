@@ -3,6 +3,15 @@
 use crate::inverse::Mode;
 use crate::nc::Dialect;
 
+/// What becomes of a move that needs the word of an axis of which it is not known where it stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnknownAxes {
+    /// The move is refused, rapid or not.
+    Refuse,
+    /// The move is written without that word, and told.
+    Keep,
+}
+
 /// How to write.
 #[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default)]
@@ -14,10 +23,15 @@ pub struct CompensateOptions {
     /// Largest error of the tip that a straight move may leave between its ends, m; without, moves stay
     /// whole.
     pub split: Option<f64>,
+    /// Largest correction of the tip, m; without, ten times what deviations of the size of the machine's tolerances make.
+    pub max_correction: Option<f64>,
     /// What counts, where it is not what the machine has joints for.
     pub mode: Option<Mode>,
     /// The dialect, where it is not to be taken from the program.
     pub dialect: Option<Dialect>,
+    /// What becomes of moves that need an axis of which it is not known where it stands; without, rapid moves are kept and
+    /// others refused.
+    pub unknown: Option<UnknownAxes>,
 }
 
 impl CompensateOptions {
@@ -42,6 +56,13 @@ impl CompensateOptions {
         self
     }
 
+    /// The same with corrections of the tip up to a bound, m.
+    #[must_use]
+    pub fn with_max_correction(mut self, bound: f64) -> Self {
+        self.max_correction = Some(bound);
+        self
+    }
+
     /// The same with another account of what counts.
     #[must_use]
     pub fn with_mode(mut self, mode: Mode) -> Self {
@@ -53,6 +74,13 @@ impl CompensateOptions {
     #[must_use]
     pub fn with_dialect(mut self, dialect: Dialect) -> Self {
         self.dialect = Some(dialect);
+        self
+    }
+
+    /// The same with another fate of moves that need an axis of which it is not known where it stands.
+    #[must_use]
+    pub fn with_unknown(mut self, unknown: UnknownAxes) -> Self {
+        self.unknown = Some(unknown);
         self
     }
 }

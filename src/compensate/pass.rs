@@ -3,20 +3,24 @@
 use std::io::Write;
 
 use super::corrector::{Correction, Corrector};
+use super::envelope::Envelope;
 use super::event::Event;
+use super::fault::CompensateFault;
 use super::interpreter::Interpreter;
 use super::model::Model;
 use super::motion_word::{first_of, motion_word};
-use super::options::CompensateOptions;
+use super::options::{CompensateOptions, UnknownAxes};
 use super::output::put;
 use super::position::Position;
-use super::report::{OutOfTravel, Report, Reversal, SingularBlock, UnknownWay, Unreached, UnseenPiece};
-use super::style::Style;
+use super::refusal::refuse;
+use super::report::{Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, UnseenPiece};
+use super::style::{Style, plain};
 use super::tip_error::TipError;
 use super::unseen::UnseenSums;
 use super::words;
 use crate::error::Result;
 use crate::inverse::{Outcome, Solution};
+use crate::machine::JointKind;
 use crate::nc::{Block, Motion, MotionKind};
 
 /// A program being corrected.
@@ -28,6 +32,7 @@ pub(super) struct Pass<'a> {
     /// Motion in force by what has been written.
     written_motion: Option<MotionKind>,
     report: Report,
+    envelope: Envelope,
     unseen: UnseenSums,
     /// The last line that went beyond what the calibration has seen.
     extrapolated: usize,
@@ -52,6 +57,7 @@ impl<'a> Pass<'a> {
             style: Style::new(options.decimals),
             written_motion: None,
             report: Report { machine: machine.name().to_string(), ..Report::default() },
+            envelope: Envelope::new(machine, options.max_correction),
             unseen: UnseenSums::default(),
             extrapolated: 0,
         }
@@ -79,10 +85,15 @@ impl<'a> Pass<'a> {
     }
 
     /// Follows a block up to its move under program coordinates, which is the caller's; without one the block is written as it is.
-    pub fn begin(&mut self, block: &Block, out: &mut dyn Write) -> Result<Option<(Motion, Vec<f64>, bool)>> {
+    pub fn begin(
+        &mut self,
+        block: &mut Block,
+        out: &mut dyn Write,
+    ) -> Result<Option<(Motion, Vec<f64>, bool)>> {
         for event in self.program.block(block)? {
             match event {
                 Event::Units => self.style.forget_lengths(),
+                Event::Preset { words } => self.put_preset(block, &words)?,
                 Event::Drilled => self.report.cycles += 1,
                 Event::Sent { q, ways, kind } => {
                     self.corrector.advance(&q, &ways);
@@ -99,6 +110,21 @@ impl<'a> Pass<'a> {
         }
         put(block, out)?;
         Ok(None)
+    }
+
+    /// Adds to the numbers of a preset what the machine stands beside the place that is meant.
+    fn put_preset(&mut self, block: &mut Block, words: &[(usize, usize, f64)]) -> Result<()> {
+        let control = self.program.control();
+        for &(word, axis, by) in words {
+            let Some(number) = plain(&block.words()[word]) else { continue };
+            let places = self.style.places(control, axis).max(number.decimals);
+            let text = number.write_like(number.value + control.programmed(axis, by), Some(places));
+            if (control.programmed(axis, by)).abs() > 0.500_001 * 10f64.powi(-(places as i32)) {
+                block.replace(word, &self.style.pointed(&text))?;
+                self.report.corrected_words += 1;
+            }
+        }
+        Ok(())
     }
 
     /// Goes to a position that is corrected in this line, or passes it there.
@@ -136,26 +162,59 @@ impl<'a> Pass<'a> {
         }
     }
 
+    /// Refuses or tells a move to `q` that needs axes of which it is not known where they stand; of axes asked of by `is_asked`.
+    pub fn need_places(
+        &mut self,
+        block: &Block,
+        motion: &Motion,
+        q: &[f64],
+        is_asked: &dyn Fn(usize) -> bool,
+    ) -> Result<()> {
+        let wanted = self.corrector.wants(&self.program, &self.style, q, is_asked);
+        if wanted.is_empty() {
+            return Ok(());
+        }
+        let axes: Vec<String> =
+            wanted.iter().map(|i| self.program.control().axes()[*i].address().to_string()).collect();
+        let keeps = match self.options.unknown {
+            Some(unknown) => unknown == UnknownAxes::Keep,
+            None => motion.kind == MotionKind::Rapid,
+        };
+        if !keeps {
+            return refuse(block, 0, CompensateFault::UnknownPlace { axes });
+        }
+        let line = block.line();
+        self.report.unknown_places.push_once(UnknownPlace { line, axes }, line);
+        Ok(())
+    }
+
     /// Corrects a position, as [`Corrector::correct`].
+    ///
+    /// # Errors
+    /// [`CompensateFault::OutOfTravel`] where a joint would have to leave its travel.
     pub fn correct(
         &mut self,
-        line: usize,
+        block: &Block,
         q: &[f64],
-        block: Option<&Block>,
-        words: &[Option<usize>],
-    ) -> Correction {
-        let correction = self.corrector.correct(&self.program, &self.style, q, block, words);
-        self.note(line, correction.solution());
-        correction
+        words: Option<&[Option<usize>]>,
+    ) -> Result<Correction> {
+        let carrier = words.is_some().then_some(block);
+        let correction =
+            self.corrector.correct(&self.program, &self.style, q, carrier, words.unwrap_or_default());
+        self.note(block, correction.solution())?;
+        Ok(correction)
     }
 
     /// Notes what the inverse could not do.
-    fn note(&mut self, line: usize, solution: &Solution) {
+    fn note(&mut self, block: &Block, solution: &Solution) -> Result<()> {
+        let line = block.line();
         let left_rad = solution.angle_left_rad;
         match solution.outcome {
             Outcome::OutOfTravel { command, by } => {
-                let joint = self.corrector.machine().commands()[command].clone();
-                self.report.out_of_travel.push_once(OutOfTravel { line, joint, by }, line);
+                let machine = self.corrector.machine();
+                let joint = machine.commands()[command].clone();
+                let rotary = machine.command_joint(command).kind == JointKind::Revolute;
+                return refuse(block, 0, CompensateFault::OutOfTravel { joint, by, rotary });
             }
             Outcome::Singular { lost_w } => {
                 let lost_w = lost_w.to_array();
@@ -169,6 +228,7 @@ impl<'a> Pass<'a> {
             }
             _ => {}
         }
+        Ok(())
     }
 
     /// Puts the numbers of a correction into a block.
@@ -198,7 +258,11 @@ impl<'a> Pass<'a> {
     }
 
     /// Takes a corrected position as reached.
-    pub fn arrive(&mut self, line: usize, meant: Position, written: Position) {
+    ///
+    /// # Errors
+    /// [`CompensateFault::TooFar`] where it is further off than any machine of these tolerances would be.
+    pub fn arrive(&mut self, block: &Block, meant: Position, written: Position) -> Result<()> {
+        let line = block.line();
         let control = self.program.control();
         // Where an axis stands at a place of the machine, the tip is nowhere that matters.
         if !self.program.places().any_parked() {
@@ -207,12 +271,16 @@ impl<'a> Pass<'a> {
             self.report.largest_left_rad.take(left.rad(), line);
         }
         let correction = TipError::between(control.tip_pose(written.q()), control.tip_pose(meant.q()));
+        if let Some(bound_m) = self.envelope.exceeded(control, meant.q(), correction.m()) {
+            return refuse(block, 0, CompensateFault::TooFar { by_m: correction.m(), bound_m });
+        }
         self.report.largest_correction_m.take(correction.m(), line);
         self.report.largest_correction_rad.take(correction.rad(), line);
         if let Some(patterns) = self.corrector.unseen().filter(|p| !p.is_empty()) {
             self.unseen.add(control, patterns, written.q());
         }
         self.program.arrive(meant, written);
+        Ok(())
     }
 
     /// Takes a place as reached at which a cycle has run.

@@ -95,16 +95,14 @@ pub struct UnknownWay {
     pub side: i8,
 }
 
-/// A joint that would leave its travel.
+/// A move that needs the words of axes of which it is not known where they stand, and is written without.
 #[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct OutOfTravel {
+pub struct UnknownPlace {
     /// Line of the block.
     pub line: usize,
-    /// Name of the joint.
-    pub joint: String,
-    /// How far beyond its limit, m or rad.
-    pub by: f64,
+    /// Addresses of the axes.
+    pub axes: Vec<String>,
 }
 
 /// A pose at which the joints have lost a direction.
@@ -178,8 +176,9 @@ pub struct Report {
     pub unseen_directions: Listed<UnseenPiece>,
     /// Where an axis whose direction of travel counts comes from a place that is not known.
     pub unknown_ways: Listed<UnknownWay>,
-    /// Blocks at which a joint would leave its travel.
-    pub out_of_travel: Listed<OutOfTravel>,
+    /// Moves that are not corrected in full, because it is not known where an axis stands.
+    #[serde(default)]
+    pub unknown_places: Listed<UnknownPlace>,
     /// Blocks at which a direction of the tool is lost.
     pub singular: Listed<SingularBlock>,
     /// Blocks whose tip the machine does not reach.

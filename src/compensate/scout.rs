@@ -95,7 +95,7 @@ impl<'a> Follow<'a> for Scout<'a> {
     fn block(&mut self, block: &mut Block, _: &mut dyn Write) -> Result<()> {
         for event in self.program.block(block)? {
             match event {
-                Event::Units | Event::Drilled => {}
+                Event::Units | Event::Preset { .. } | Event::Drilled => {}
                 Event::Sent { q, ways, .. } => self.tell(&q, &ways),
                 Event::Move { motion, target, drills } => self.go(block, &motion, target, drills)?,
             }

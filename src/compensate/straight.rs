@@ -2,10 +2,13 @@
 
 use std::io::Write;
 
+use super::fault::CompensateFault;
+use super::feed::{self, Way};
 use super::lines;
-use super::output::put;
+use super::output::{put, put_bytes};
 use super::pass::Pass;
 use super::position::Position;
+use super::refusal::refuse;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Motion, MotionKind};
 
@@ -28,6 +31,7 @@ pub(super) fn write(
     let q = pass.program().joints(block, &target)?;
     let end = Position::new(q, target);
     pass.advance(line, end.q());
+    pass.need_places(block, motion, end.q(), &|_| true)?;
     let feeds = motion.kind != MotionKind::Rapid;
     if let Some(tolerance) = pass.options().split
         && feeds
@@ -42,19 +46,40 @@ pub(super) fn write(
             count *= 2;
         }
         if count > 1 {
+            let there = pass.correct(block, end.q(), None)?;
+            let ways = [Way { from: &meant, to: &end }, Way { from: &written, to: there.written() }];
+            if feed::is_upset(pass.program(), motion, &ways[0], &ways[1]) {
+                return refuse(block, 0, CompensateFault::RotaryFeed);
+            }
             pass.report().split_moves += 1;
             return lines::write(pass, (block, motion), count, &at, None, out);
         }
     }
-    let correction = pass.correct(line, end.q(), Some(block), &motion.words);
+    let correction = pass.correct(block, end.q(), Some(&motion.words))?;
     pass.restate(block, motion)?;
     pass.put_words(block, motion, &correction)?;
     if feeds && known {
         let left = mid_line(pass, (&meant, &end), (&written, correction.written()));
         pass.report().largest_mid_line_m.take(left, line);
     }
-    pass.arrive(line, end, correction.into_written());
-    put(block, out)
+    let goes = |from, to| Way { from, to };
+    let meant_way = goes(&meant, &end);
+    let restored =
+        if feed::is_upset(pass.program(), motion, &meant_way, &goes(&written, correction.written())) {
+            Some(feed::keep_time(pass.program(), block, motion, &meant_way)?)
+        } else {
+            None
+        };
+    pass.arrive(block, end, correction.into_written())?;
+    put(block, out)?;
+    match restored {
+        Some(line) => {
+            let ending = if block.bytes().ends_with(b"\r\n") { "\r\n" } else { "\n" };
+            let before = if block.bytes().ends_with(b"\n") { "" } else { ending };
+            put_bytes(format!("{before}{line}{ending}").as_bytes(), out)
+        }
+        None => Ok(()),
+    }
 }
 
 /// Largest error of the tip, m, that a straight move leaves in `count` equal parts, rounding aside.

@@ -50,6 +50,10 @@ impl Tool {
         Tool { in_spindle, ..Tool::default() }
     }
 
+    pub fn in_spindle(&self) -> Option<&str> {
+        self.in_spindle.as_deref()
+    }
+
     /// T, M6, G43, H, D; whether the length that counts may have changed. `before`: modes before this block.
     pub fn change(&mut self, block: &Block, dialect: Dialect, before: &Modes, modes: &Modes) -> bool {
         let word = |address: &str| block.words().iter().find(|w| w.address == address);
@@ -80,7 +84,12 @@ impl Tool {
                 _ => {}
             }
         }
-        called || m6 || counts.is_some() || word("H").is_some() || word("D").is_some()
+        let edge = match dialect {
+            Dialect::Rs274 => word("H"),
+            Dialect::Siemens => word("D"),
+            Dialect::Heidenhain => None,
+        };
+        called || m6 || counts.is_some() || edge.is_some()
     }
 
     /// Lengths of the tool that is there and of the one that the control counts with.

@@ -62,6 +62,11 @@ impl Block {
         &self.words
     }
 
+    /// Where the last token ends.
+    pub(super) fn content_end(&self) -> usize {
+        self.tokens.iter().rfind(|t| t.kind != Kind::Comment).map_or(0, |t| t.span.end)
+    }
+
     /// Whether a word has this address.
     pub(super) fn has_word(&self, address: &str) -> bool {
         self.words.iter().any(|w| w.address == address)

@@ -136,6 +136,8 @@ impl<'a> Effects<'a> {
                     self.axes.lose(line, Why::OtherWords, is_linear);
                 }
             }
+            "BEGIN" if next.ends_with(" INCH") => self.measured_in(Units::Inch, line),
+            "BEGIN" if next.ends_with(" MM") => self.measured_in(Units::Millimetre, line),
             "CC" => self.reading.purpose = Purpose::Nothing,
             "FUNCTION" if next.starts_with("TCPM") => self.transform(true, line),
             "FUNCTION" if next.starts_with("RESET TCPM") => self.transform(false, line),

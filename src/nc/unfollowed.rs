@@ -53,7 +53,7 @@ impl Known<'_> {
     /// The first piece of the block that is not followed.
     pub fn first_unfollowed(&self, block: &Block) -> Option<Unfollowed> {
         let mut statement = false;
-        for token in block.tokens() {
+        for (at, token) in block.tokens().iter().enumerate() {
             let unknown = match token.kind {
                 Kind::BlockNumber | Kind::Skip | Kind::Comment | Kind::Percent => None,
                 Kind::Word(index) => self.word(block, index),
@@ -67,6 +67,13 @@ impl Known<'_> {
                 Kind::Name => {
                     let name = block.name(token);
                     statement |= takes_the_rest(&name, self.dialect);
+                    let rest = block.tokens().get(at + 1).map_or(String::new(), |t| block.text(&t.span));
+                    if !self.vocabulary.has_statement(&name, rest.trim().to_ascii_uppercase().as_str()) {
+                        return Some(Unfollowed {
+                            what: Unknown::Name,
+                            span: token.span.start..block.content_end(),
+                        });
+                    }
                     // Alone in its block it is a program of the user, and told as a call.
                     let called = self.dialect == Dialect::Siemens && name.len() > 1 && is_alone(block);
                     let known = self.vocabulary.has_name(&name)
@@ -105,7 +112,7 @@ impl Known<'_> {
             return None;
         }
         if !is_axis(address) {
-            return Some(Unknown::Address);
+            return Some(if address.starts_with('$') { Unknown::Parameter } else { Unknown::Address });
         }
         self.targets.then_some(Unknown::Axis)
     }

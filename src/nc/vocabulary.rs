@@ -14,8 +14,20 @@ pub(super) struct Vocabulary {
     pub names: &'static str,
     /// Names with arguments that neither move nor call a program of the user.
     pub calls: &'static str,
+    /// What may follow names behind which the rest of the block belongs to them; any other such name may be followed by anything.
+    pub statements: &'static [Statement],
     /// How parameters, variables and indexed words begin that may be written.
     pub parameters: &'static [&'static str],
+}
+
+/// What may stand behind a name.
+pub(super) struct Statement {
+    /// The name.
+    pub name: &'static str,
+    /// How the rest begins; nothing else may follow. Without any, nothing may.
+    pub starts: &'static [&'static str],
+    /// Words that may not be in it.
+    pub never: &'static [&'static str],
 }
 
 /// Codes of one action, from the first to the last.
@@ -23,17 +35,28 @@ pub(super) struct Codes {
     /// In tenths: `G54.1` is `54_1`.
     first: u32,
     last: u32,
+    /// From one code to the next.
+    step: u32,
     action: Action,
 }
 
 impl Codes {
     pub const fn one(code: u32, action: Action) -> Self {
-        Codes { first: code, last: code, action }
+        Codes { first: code, last: code, action, step: 1 }
     }
 
-    /// Whole codes and tenths alike.
-    pub const fn range(first: u32, last: u32, action: Action) -> Self {
-        Codes { first, last, action }
+    /// With the tenths between.
+    pub const fn tenths(first: u32, last: u32, action: Action) -> Self {
+        Codes { first, last, action, step: 1 }
+    }
+
+    /// Whole codes only.
+    pub const fn whole(first: u32, last: u32, action: Action) -> Self {
+        Codes { first, last, action, step: 10 }
+    }
+
+    fn has(&self, tenths: u32) -> bool {
+        (self.first..=self.last).contains(&tenths) && (tenths - self.first).is_multiple_of(self.step)
     }
 }
 
@@ -119,6 +142,19 @@ impl Vocabulary {
         listed(self.calls, name)
     }
 
+    /// Whether what follows the name is followed. `rest`: in upper case.
+    pub fn has_statement(&self, name: &str, rest: &str) -> bool {
+        let name = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        let begins = |start: &&&str| {
+            let behind = rest.strip_prefix(**start).map(|behind| behind.chars().next());
+            // `DEF 2` is not the start of `DEF 200`.
+            behind.is_some_and(|next| !next.is_some_and(|c| c.is_ascii_alphanumeric()))
+        };
+        self.statements.iter().filter(|s| s.name == name).all(|s| {
+            s.starts.iter().any(|start| begins(&start)) && !s.never.iter().any(|word| rest.contains(word))
+        })
+    }
+
     /// Whether the address may stand in a block, beside those of axes.
     pub fn has_address(&self, address: &str) -> bool {
         let letters = address.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -149,7 +185,7 @@ fn find(codes: &[Codes], number: f64) -> Option<Action> {
         return None;
     }
     let tenths = tenths.round() as u32;
-    codes.iter().find(|codes| (codes.first..=codes.last).contains(&tenths)).map(|codes| codes.action)
+    codes.iter().find(|codes| codes.has(tenths)).map(|codes| codes.action)
 }
 
 fn listed(names: &str, name: &str) -> bool {

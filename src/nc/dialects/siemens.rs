@@ -1,7 +1,7 @@
 //! SINUMERIK 840D and its relatives.
 
 use super::super::modes::{Distance, Feed, MotionKind, Plane, Units};
-use super::super::vocabulary::{Action::*, Codes, Vocabulary};
+use super::super::vocabulary::{Action::*, Codes, Statement, Vocabulary};
 
 pub(super) const VOCABULARY: Vocabulary = Vocabulary {
     g: &[
@@ -15,53 +15,53 @@ pub(super) const VOCABULARY: Vocabulary = Vocabulary {
         Codes::one(18_0, Plane(Plane::Zx)),
         Codes::one(19_0, Plane(Plane::Yz)),
         // Limits of the spindle and of the working area.
-        Codes::range(25_0, 26_0, NoTargets),
-        Codes::range(33_0, 35_0, Motion(MotionKind::Other)),
-        Codes::range(40_0, 42_0, Nothing),
+        Codes::whole(25_0, 26_0, NoTargets),
+        Codes::whole(33_0, 35_0, Motion(MotionKind::Other)),
+        Codes::whole(40_0, 42_0, Nothing),
         Codes::one(53_0, MachineFrame),
         Codes::one(54_0, Offset),
         Codes::one(55_0, Offset),
         Codes::one(56_0, Offset),
         Codes::one(57_0, Offset),
-        Codes::range(58_0, 59_0, Frame),
+        Codes::whole(58_0, 59_0, Frame),
         Codes::one(60_0, Nothing),
         Codes::one(62_0, Nothing),
         Codes::one(63_0, Motion(MotionKind::Other)),
         Codes::one(64_0, Nothing),
         Codes::one(70_0, Units(Units::Inch)),
         Codes::one(71_0, Units(Units::Millimetre)),
-        Codes::range(74_0, 75_0, Reference),
+        Codes::whole(74_0, 75_0, Reference),
         Codes::one(90_0, Distance(Distance::Absolute)),
         Codes::one(91_0, Distance(Distance::Incremental)),
         Codes::one(93_0, Feed(Feed::InverseTime)),
         Codes::one(94_0, Feed(Feed::PerMinute)),
         Codes::one(95_0, Feed(Feed::PerRevolution)),
-        Codes::range(96_0, 97_0, Nothing),
+        Codes::whole(96_0, 97_0, Nothing),
         // Poles of polar coordinates, which are refused where a block uses them.
-        Codes::range(110_0, 112_0, NoTargets),
+        Codes::whole(110_0, 112_0, NoTargets),
         Codes::one(153_0, MachineFrame),
-        Codes::range(331_0, 332_0, Motion(MotionKind::Other)),
-        Codes::range(450_0, 451_0, Nothing),
-        Codes::range(460_0, 462_0, Nothing),
+        Codes::whole(331_0, 332_0, Motion(MotionKind::Other)),
+        Codes::whole(450_0, 451_0, Nothing),
+        Codes::whole(460_0, 462_0, Nothing),
         Codes::one(500_0, Offset),
-        Codes::range(505_0, 599_0, Offset),
-        Codes::range(601_0, 603_0, Nothing),
+        Codes::whole(505_0, 599_0, Offset),
+        Codes::whole(601_0, 603_0, Nothing),
         Codes::one(621_0, Nothing),
-        Codes::range(641_0, 645_0, Nothing),
+        Codes::whole(641_0, 645_0, Nothing),
         Codes::one(700_0, Units(Units::Inch)),
         Codes::one(710_0, Units(Units::Millimetre)),
         Codes::one(751_0, Reference),
-        Codes::range(961_0, 962_0, Nothing),
-        Codes::range(971_0, 973_0, Nothing),
+        Codes::whole(961_0, 962_0, Nothing),
+        Codes::whole(971_0, 973_0, Nothing),
     ],
     m: &[
-        Codes::range(0_0, 5_0, Nothing),
+        Codes::whole(0_0, 5_0, Nothing),
         Codes::one(6_0, ToolChange),
-        Codes::range(7_0, 11_0, Nothing),
+        Codes::whole(7_0, 11_0, Nothing),
         Codes::one(17_0, Nothing),
         Codes::one(19_0, Nothing),
         Codes::one(30_0, Nothing),
-        Codes::range(40_0, 45_0, Nothing),
+        Codes::whole(40_0, 45_0, Nothing),
         Codes::one(70_0, Nothing),
     ],
     addresses: &[
@@ -86,6 +86,14 @@ pub(super) const VOCABULARY: Vocabulary = Vocabulary {
         INIT CLEARM SETM COUPDEL COUPOF TRAILOF AXNAME GETSELT GETT MMC SETPIECE ADIS PRIO SPI FCTDEF ENABLE DISABLE DEBUG
         PRINT LOG AC IC DC ACP ACN FGROUP TANGOF TRAORI SUPD WALIMOF SPCON SPCOF
     ",
+    // What runs beside the program, or interrupts it.
+    statements: &[
+        Statement { name: "WHEN", starts: &[], never: &[] },
+        Statement { name: "WHENEVER", starts: &[], never: &[] },
+        Statement { name: "EVERY", starts: &[], never: &[] },
+        Statement { name: "FROM", starts: &[], never: &[] },
+        Statement { name: "SETINT", starts: &[], never: &[] },
+    ],
     // Several spindles and auxiliary functions, arithmetic parameters, the user's own names; of the control's variables those
     // that count, time and switch; limits of speed by axis.
     parameters: &[

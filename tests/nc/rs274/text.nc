@@ -1,0 +1,6 @@
+G21 G90 G94 G17
+G0 X0. Y0. Z50. A20. C30.
+G1 X10. Y5. Z10. F500.
+hello world
+G1 X12. Y6. F500.
+M30
