@@ -13,6 +13,7 @@ mod output;
 mod part;
 mod predict;
 mod simulate;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -44,6 +45,8 @@ enum Command {
     Diagnose(diagnose::Args),
     /// The NC program with corrected axis words, everything else as it was
     Compensate(compensate::Args),
+    /// Prove that a compensated program brings the tool of the calibrated machine where the original means it
+    Verify(verify::Args),
     /// Recordings of a machine whose errors are known: standard tests, random poses, NC programs
     Simulate(Box<simulate::Args>),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
@@ -74,6 +77,7 @@ pub fn run() -> ExitCode {
         Command::Join(args) => join::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Compensate(args) => compensate::run(&args),
+        Command::Verify(args) => verify::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Demo(args) => demo::run(&args),
     };

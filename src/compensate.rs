@@ -96,7 +96,10 @@ mod subprograms;
 
 mod gaps;
 mod scout;
+mod trace;
 mod writer;
+
+mod verify;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
@@ -110,6 +113,7 @@ pub use report::{
     UnseenPattern, UnseenPiece, Worst,
 };
 pub use setup::{Setup, ToolAxis};
+pub use verify::{Departure, Verification, VerifyOptions, verify};
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
@@ -121,7 +125,7 @@ use gaps::{Gaps, is_gap};
 use interpreter::Interpreter;
 use output::put;
 use scout::Scout;
-use subprograms::{Bounds, Follow, SubPrograms};
+use subprograms::{follow, sub_programs};
 use writer::Writer;
 
 /// Corrects the program `path` and writes it to `out`. Memory does not grow with the program, sub-programs
@@ -246,17 +250,6 @@ fn correct<R: BufRead>(
     Ok(report)
 }
 
-/// The sub-programs of a file.
-fn sub_programs<R: BufRead>(program: &mut Program<R>) -> Result<SubPrograms> {
-    let (dialect, mut bounds, mut calls) = (program.dialect(), Bounds::default(), SubPrograms::default());
-    while let Some(block) = program.next_block()? {
-        if let Some(name) = bounds.of(&block, dialect) {
-            calls.add(&name, &block);
-        }
-    }
-    Ok(calls)
-}
-
 /// All that the program needs of the set-up and the set-up does not say.
 fn gaps<'a, R: BufRead>(
     machine: &'a Machine,
@@ -268,31 +261,6 @@ fn gaps<'a, R: BufRead>(
     let mut calls = sub_programs(&mut program)?;
     follow(&mut gaps, &mut open()?, &mut calls, &mut std::io::sink(), |_| false)?;
     Ok(gaps)
-}
-
-/// One pass, to the end or as far as it is `done`; how many blocks there are.
-fn follow<'a, F: Follow<'a>, R: BufRead>(
-    follower: &mut F,
-    program: &mut Program<R>,
-    calls: &mut SubPrograms,
-    out: &mut dyn Write,
-    done: impl Fn(&F) -> bool,
-) -> Result<u64> {
-    let dialect = program.dialect();
-    let mut bounds = Bounds::default();
-    let mut blocks = 0;
-    while let Some(mut block) = program.next_block()? {
-        blocks += 1;
-        if bounds.of(&block, dialect).is_some() {
-            calls.write(&block, out)?;
-        } else {
-            calls.block(follower, &mut block, 0, out)?;
-        }
-        if done(follower) {
-            break;
-        }
-    }
-    Ok(blocks)
 }
 
 /// A machine without errors: the program as it is.

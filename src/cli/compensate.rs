@@ -28,6 +28,9 @@ pub(crate) struct Args {
     /// Tools and work offsets, docs/compensate.md
     #[arg(long, value_name = "SETUP.ron")]
     setup: Option<PathBuf>,
+    /// M codes of the machine's builder and the axes that they move, {"M170": [], "M60": ["Z"]}
+    #[arg(long, value_name = "FILE")]
+    m_codes: Option<PathBuf>,
     /// Write arcs as lines within this tolerance, such as 0.002mm
     #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
     arcs: Option<f64>,
@@ -72,15 +75,24 @@ enum UnknownWord {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
-enum DialectWord {
+pub(super) enum DialectWord {
     /// LinuxCNC, Fanuc, Haas and their kin
     Rs274,
     Siemens,
     Heidenhain,
 }
 
+/// The dialect of a word.
+pub(super) fn dialect_of(word: DialectWord) -> Dialect {
+    match word {
+        DialectWord::Rs274 => Dialect::Rs274,
+        DialectWord::Siemens => Dialect::Siemens,
+        DialectWord::Heidenhain => Dialect::Heidenhain,
+    }
+}
+
 /// A length with its unit, m.
-fn tolerance(text: &str) -> Result<f64, String> {
+pub(super) fn tolerance(text: &str) -> Result<f64, String> {
     let digits = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
     let (number, unit) = text.split_at(digits);
     let unit = Unit::named(unit.trim()).filter(|u| u.quantity == Quantity::Length);
@@ -110,7 +122,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
         }
     }
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
-    let setup = args.setup.as_ref().map_or(Ok(Setup::default()), Setup::open)?;
+    let mut setup = args.setup.as_ref().map_or(Ok(Setup::default()), Setup::open)?;
+    if let Some(codes) = &args.m_codes {
+        setup = setup.with_m_codes(codes)?;
+    }
     let options = CompensateOptions {
         decimals: args.decimals.map(usize::from),
         arcs: args.arcs,
@@ -125,11 +140,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
             UnknownWord::Refuse => UnknownAxes::Refuse,
             UnknownWord::Keep => UnknownAxes::Keep,
         }),
-        dialect: args.dialect.map(|dialect| match dialect {
-            DialectWord::Rs274 => Dialect::Rs274,
-            DialectWord::Siemens => Dialect::Siemens,
-            DialectWord::Heidenhain => Dialect::Heidenhain,
-        }),
+        dialect: args.dialect.map(dialect_of),
     };
     let progress = args.common.progress();
     progress.say(&format!("correcting {}", args.program.display()));
@@ -165,7 +176,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
 /// What is less is the rounding of the calculation, m or rad.
 const NOTHING: f64 = 1e-11;
 
-fn at(worst: Worst, show: fn(f64) -> String) -> String {
+pub(super) fn at(worst: Worst, show: fn(f64) -> String) -> String {
     match worst.line {
         0 => show(worst.value),
         line => format!("{} (line {line})", show(worst.value)),

@@ -109,6 +109,11 @@ fn keyed<T: Clone>(map: &BTreeMap<String, T>) -> BTreeMap<String, T> {
     map.iter().map(|(name, value)| (key(name), value.clone())).collect()
 }
 
+/// M codes and addresses of axes in upper case.
+fn upper(codes: BTreeMap<String, Vec<String>>) -> BTreeMap<String, Vec<String>> {
+    codes.into_iter().map(|(code, axes)| (key(&code), axes.iter().map(|axis| key(axis)).collect())).collect()
+}
+
 impl Setup {
     /// Reads a file.
     ///
@@ -163,13 +168,23 @@ impl Setup {
         form.start = keyed(&form.start);
         form.reference = keyed(&form.reference);
         form.tools = keyed(&form.tools);
-        form.m_codes = keyed(&form.m_codes);
-        form.m_codes.values_mut().flatten().for_each(|axis| *axis = key(axis));
+        form.m_codes = upper(form.m_codes);
         form.work_offsets = keyed(&form.work_offsets).into_iter().map(|(k, v)| (k, keyed(&v))).collect();
         for list in [&mut form.tcp_on, &mut form.tcp_off, &mut form.calls] {
             list.iter_mut().for_each(|name| *name = key(name));
         }
         Ok(Setup { form, units: Some(units) })
+    }
+
+    /// The same with the axes that M codes move, from a file that is a map of codes to addresses: `{"M170": [], "M60": ["Z"]}`.
+    ///
+    /// # Errors
+    /// As [`Setup::open`].
+    pub fn with_m_codes(mut self, path: impl AsRef<Path>) -> Result<Self> {
+        let document = Document::open(path)?.guided(GUIDE);
+        let codes: BTreeMap<String, Vec<String>> = document.read()?;
+        self.form.m_codes.extend(upper(codes));
+        Ok(self)
     }
 
     fn si(&self, value: f64, rotary: bool) -> f64 {

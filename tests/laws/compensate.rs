@@ -18,6 +18,7 @@ mod any;
 mod constructs;
 mod linuxcnc;
 mod pieces;
+mod verify;
 
 /// A shipped machine with random deviations, `size` times its tolerances.
 fn erroneous(stem: &str, size: f64) -> CalibratedMachine {

@@ -1,0 +1,106 @@
+//! `kincal verify`
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use crate::calibration::CalibratedMachine;
+use crate::compensate::{Departure, Setup, Verification, VerifyOptions, verify};
+
+use super::Common;
+use super::compensate::{DialectWord, at, dialect_of, tolerance};
+use super::output::{Failure, Outcome, angle, check_outputs, count, length, open_machine};
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// NC program as it was
+    #[arg(value_name = "PROGRAM.nc")]
+    program: PathBuf,
+    /// NC program that was written for it
+    #[arg(value_name = "COMPENSATED.nc")]
+    compensated: PathBuf,
+    /// Calibrated machine
+    #[arg(value_name = "CALIBRATED.ron")]
+    machine: PathBuf,
+    /// How far the tip may be off at the end of a move
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance, default_value = "0.002mm")]
+    tolerance: f64,
+    /// How far the tip may be off the path between the ends of moves; without this it is told and not judged
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
+    between: Option<f64>,
+    /// Distance of the places at which a move is looked at
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance, default_value = "1mm")]
+    chord: f64,
+    /// Tools and work offsets, docs/compensate.md
+    #[arg(long, value_name = "SETUP.ron")]
+    setup: Option<PathBuf>,
+    /// M codes of the machine's builder and the axes that they move, {"M170": [], "M60": ["Z"]}
+    #[arg(long, value_name = "FILE")]
+    m_codes: Option<PathBuf>,
+    /// The control, where the program's first lines do not say it
+    #[arg(long, value_enum)]
+    dialect: Option<DialectWord>,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(crate) fn run(args: &Args) -> Outcome {
+    check_outputs(&[args.common.json_file()], &[])?;
+    let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
+    let mut setup = args.setup.as_ref().map_or(Ok(Setup::default()), Setup::open)?;
+    if let Some(codes) = &args.m_codes {
+        setup = setup.with_m_codes(codes)?;
+    }
+    let options = VerifyOptions {
+        tolerance: args.tolerance,
+        between: args.between,
+        chord: args.chord,
+        dialect: args.dialect.map(dialect_of),
+    };
+    let progress = args.common.progress();
+    progress.say(&format!("reading {}", args.compensated.display()));
+    let found = verify(&calibrated, &args.program, &args.compensated, &setup, &options)?;
+    drop(progress);
+    args.common.say(&render(&found));
+    args.common.write_json(&found)?;
+    if found.holds() {
+        return Ok(());
+    }
+    let moves = count(found.departures.count, "move", "moves");
+    Err(Failure::Answer(format!(
+        "{}: {moves} not where {} means it",
+        args.compensated.display(),
+        args.program.display()
+    )))
+}
+
+/// What was found, as people read it.
+fn render(found: &Verification) -> String {
+    let mut text = format!("{}, {} judged\n", count(found.moves, "move", "moves"), found.judged);
+    let _ = writeln!(
+        text,
+        "largest error at the end of a move: tip {}, tool axis {}",
+        at(found.largest_end_m, length),
+        at(found.largest_axis_rad, angle)
+    );
+    let _ = writeln!(text, "largest error beside the meant path: {}", at(found.largest_between_m, length));
+    let mut worst: Vec<_> = found.departures.first.iter().collect();
+    let size =
+        |d: &Departure| d.end_m.zip(d.between_m).map_or(f64::INFINITY, |(end, between)| end.max(between));
+    worst.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    for departure in worst.into_iter().take(10) {
+        let written = departure.compensated_line;
+        let _ = match (departure.line, departure.end_m, departure.between_m) {
+            (line, Some(end), Some(between)) => writeln!(
+                text,
+                "  line {line} (written in line {written}): {} at its end, {} beside its path",
+                length(end),
+                length(between)
+            ),
+            (0, ..) => {
+                writeln!(text, "  line {written} of what was written: a move that the original does not have")
+            }
+            (line, ..) => writeln!(text, "  line {line}: no move was written for it"),
+        };
+    }
+    text
+}

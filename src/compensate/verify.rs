@@ -1,0 +1,261 @@
+//! Verification: a compensated program is read anew, and where it takes the tip of the calibrated machine is held against where the
+//! original takes that of the nominal one, `docs/compensate.md` (C16).
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::calibrated::model_of;
+use super::interpreter::Interpreter;
+use super::model::Model;
+use super::report::{Listed, Worst};
+use super::scout::Scout;
+use super::setup::Setup;
+use super::subprograms::follow_all;
+use super::trace::{Leg, Machine, Sort, Trace};
+use crate::calibration::CalibratedMachine;
+use crate::chain::Chain;
+use crate::error::{Error, Result};
+use crate::lie::{Pose, Vec3};
+use crate::nc::{Dialect, Program};
+
+/// How programs are compared.
+#[non_exhaustive]
+#[derive(Clone, Copy, Debug)]
+pub struct VerifyOptions {
+    /// How far the tip may be off at the end of a move, m.
+    pub tolerance: f64,
+    /// How far it may be off the path between the ends of moves, m; without, that is told and not judged.
+    pub between: Option<f64>,
+    /// Distance of the places at which a move is looked at, m.
+    pub chord: f64,
+    /// The dialect, where it is not to be taken from the program.
+    pub dialect: Option<Dialect>,
+}
+
+impl Default for VerifyOptions {
+    /// 2 um at the ends of moves; moves looked at every millimetre.
+    fn default() -> Self {
+        VerifyOptions { tolerance: 2e-6, between: None, chord: 1e-3, dialect: None }
+    }
+}
+
+impl VerifyOptions {
+    /// The same with another tolerance at the ends of moves, m.
+    #[must_use]
+    pub fn with_tolerance(mut self, tolerance: f64) -> Self {
+        self.tolerance = tolerance;
+        self
+    }
+
+    /// The same with a tolerance between the ends of moves, m.
+    #[must_use]
+    pub fn with_between(mut self, between: f64) -> Self {
+        self.between = Some(between);
+        self
+    }
+}
+
+/// A move whose tip is not where it is meant.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Departure {
+    /// Line of the original; 0 for a move that it does not have.
+    pub line: usize,
+    /// Line of the compensated program.
+    pub compensated_line: usize,
+    /// How far off at its end, m; none where a move has no counterpart.
+    pub end_m: Option<f64>,
+    /// How far off the meant path before its end, m; likewise.
+    pub between_m: Option<f64>,
+}
+
+/// What a comparison found.
+#[non_exhaustive]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Verification {
+    /// Name of the machine.
+    pub machine: String,
+    /// Moves of the original.
+    pub moves: u64,
+    /// Of these, moves at whose end every axis stands at a known place, so that they could be judged.
+    pub judged: u64,
+    /// Tip at the ends of moves.
+    pub largest_end_m: Worst,
+    /// Tool axis at the ends of moves.
+    pub largest_axis_rad: Worst,
+    /// Tip beside the meant path.
+    pub largest_between_m: Worst,
+    /// Moves beyond the tolerances, or without a counterpart.
+    pub departures: Listed<Departure>,
+}
+
+impl Verification {
+    /// Whether every move that could be judged is within the tolerances.
+    pub fn holds(&self) -> bool {
+        self.departures.count == 0
+    }
+}
+
+/// Reads `original` and `compensated` and compares, move by move, where they take the tip: the original on the nominal machine, the
+/// compensated one on the calibrated machine.
+///
+/// # Errors
+/// [`Error::Input`] with the line of either program that cannot be followed, [`Error::File`].
+pub fn verify(
+    calibrated: &CalibratedMachine,
+    original: impl AsRef<Path>,
+    compensated: impl AsRef<Path>,
+    setup: &Setup,
+    options: &VerifyOptions,
+) -> Result<Verification> {
+    let machine = calibrated.machine();
+    let nominal = Nominal(Chain::nominal(machine));
+    let open = |path: &Path| {
+        let file = File::open(path).map_err(|e| Error::file(path, e))?;
+        let mut program = Program::new(path, BufReader::new(file))?;
+        if let Some(dialect) = options.dialect {
+            program.set_dialect(dialect);
+        }
+        Ok::<_, Error>(program)
+    };
+    let (original, compensated) = (original.as_ref(), compensated.as_ref());
+    let start = |dialect| Interpreter::new(machine, setup, dialect);
+    let meant = {
+        let dialect = open(original)?.dialect();
+        let mut trace = Trace::new(start(dialect), nominal, options.chord);
+        follow_all(&mut trace, &|| open(original))?;
+        trace.finish()
+    };
+    let mut model = model_of(calibrated);
+    let dialect = open(compensated)?.dialect();
+    let mut first = vec![0; machine.commands().len()];
+    if !model.keyed().is_empty() {
+        let mut scout = Scout::new(start(dialect), &mut *model);
+        follow_all(&mut scout, &|| open(compensated))?;
+        first = scout.finish();
+    }
+    model.restart(&first);
+    let mut trace = Trace::new(start(dialect), Actual(model), options.chord);
+    follow_all(&mut trace, &|| open(compensated))?;
+    let written = trace.finish();
+    let mut found = compare(&meant, &written, options);
+    found.machine = machine.name().to_string();
+    Ok(found)
+}
+
+struct Nominal(Chain<f64>);
+
+impl Machine for Nominal {
+    fn send(&mut self, _: &[f64], _: &[bool]) {}
+
+    fn w_from_t(&self, q: &[f64]) -> Pose<f64> {
+        self.0.w_from_t(q)
+    }
+}
+
+struct Actual<'a>(Box<dyn Model + 'a>);
+
+impl Machine for Actual<'_> {
+    fn send(&mut self, q: &[f64], ways: &[bool]) {
+        self.0.advance(q, ways);
+    }
+
+    fn w_from_t(&self, q: &[f64]) -> Pose<f64> {
+        self.0.chain_at(q).w_from_t(q)
+    }
+}
+
+/// Each move of the original against the moves that were written for it: one, or the lines in the place of an arc or of a subdivided move.
+fn compare(meant: &[Leg], written: &[Leg], options: &VerifyOptions) -> Verification {
+    let mut found = Verification { moves: meant.len() as u64, ..Verification::default() };
+    let mut rest = written;
+    let mut from: Option<Vec3<f64>> = None;
+    for leg in meant {
+        let path: Vec<Vec3<f64>> =
+            from.into_iter().chain(leg.tips.iter().map(|pose| pose.translation)).collect();
+        let count = counterpart(leg, &path, rest, options);
+        let (own, behind) = rest.split_at(count.min(rest.len()));
+        rest = behind;
+        from = leg.tips.last().map(|pose| pose.translation);
+        let line = leg.line;
+        let Some(last) = own.last().filter(|last| (last.sort == Sort::Sent) == (leg.sort == Sort::Sent))
+        else {
+            let compensated_line = own.last().map_or(0, |leg| leg.line);
+            let lost = Departure { line, compensated_line, end_m: None, between_m: None };
+            found.departures.push(lost);
+            continue;
+        };
+        let (Some(goal), Some(tip)) = (leg.tips.last(), last.tips.last()) else { continue };
+        if !leg.known {
+            continue;
+        }
+        found.judged += 1;
+        let end_m = off(leg.sort, goal, tip);
+        let (a, b) = (goal.rotation.column(2), tip.rotation.column(2));
+        found.largest_axis_rad.take(a.cross(b).norm().atan2(a.dot(b)), line);
+        found.largest_end_m.take(end_m, line);
+        let places = own.iter().flat_map(|leg| &leg.tips).map(|pose| pose.translation);
+        let between_m = match leg.sort {
+            Sort::Cycle => 0.0,
+            _ => places.map(|p| beside(&path, p)).fold(0.0, f64::max),
+        };
+        found.largest_between_m.take(between_m, line);
+        if end_m > options.tolerance || options.between.is_some_and(|between| between_m > between) {
+            let compensated_line = last.line;
+            let (end_m, between_m) = (Some(end_m), Some(between_m));
+            found.departures.push(Departure { line, compensated_line, end_m, between_m });
+        }
+    }
+    for leg in rest {
+        let more = Departure { line: 0, compensated_line: leg.line, end_m: None, between_m: None };
+        found.departures.push(more);
+    }
+    found
+}
+
+/// How many of the written moves belong to a move of the original: as many as lead along its path to its end.
+fn counterpart(leg: &Leg, path: &[Vec3<f64>], written: &[Leg], options: &VerifyOptions) -> usize {
+    let Some(goal) = leg.tips.last().filter(|_| matches!(leg.sort, Sort::Straight | Sort::Arc)) else {
+        return 1;
+    };
+    // Pieces lie along the path, as near as what may be left between ends.
+    let near = options.between.unwrap_or(0.0).max(10.0 * options.tolerance).max(options.chord);
+    for (k, piece) in written.iter().enumerate() {
+        let Some(tip) = piece.tips.last().filter(|_| piece.sort == Sort::Straight || k == 0) else { break };
+        if off(leg.sort, goal, tip) <= options.tolerance {
+            return k + 1;
+        }
+        if beside(path, tip.translation) > near {
+            break;
+        }
+    }
+    1
+}
+
+/// How far a tip is from its goal, m; of a cycle only across the tool axis.
+fn off(sort: Sort, goal: &Pose<f64>, tip: &Pose<f64>) -> f64 {
+    let gap = tip.translation - goal.translation;
+    let axis = goal.rotation.column(2);
+    match sort {
+        Sort::Cycle => (gap - axis.times(gap.dot(axis))).norm(),
+        _ => gap.norm(),
+    }
+}
+
+/// Distance from a path, m.
+fn beside(path: &[Vec3<f64>], p: Vec3<f64>) -> f64 {
+    let to_piece = |a: Vec3<f64>, b: Vec3<f64>| {
+        let way = b - a;
+        let square = way.dot(way);
+        let s = if square > 0.0 { ((p - a).dot(way) / square).clamp(0.0, 1.0) } else { 0.0 };
+        (p - a - way.times(s)).norm()
+    };
+    match path {
+        [] => 0.0,
+        [only] => (p - *only).norm(),
+        _ => path.windows(2).map(|ends| to_piece(ends[0], ends[1])).fold(f64::INFINITY, f64::min),
+    }
+}
