@@ -11,7 +11,7 @@ const PROGRAM: &str = "G21 G90 G94\nG0 X30. Y0. Z40. A20. C10.\nG1 Z10. F800.\nX
 fn verified(
     name: &str,
     calibrated: &CalibratedMachine,
-    written: &str,
+    (program, written): (&str, &str),
     options: &VerifyOptions,
 ) -> Verification {
     let folder = std::env::temp_dir().join(format!("kincal_verify_{}_{name}", std::process::id()));
