@@ -11,7 +11,7 @@ use crate::error_motion::{Motions, eliminate};
 const HOLD: f64 = 1e-12;
 
 /// A larger prior has to make the data so much more likely, as a logarithm: a ratio of 150, what Kass and Raftery call very strong. Chosen
-/// with `tests/directions.rs` in view: docs/directions.md tells how it fares elsewhere.
+/// with `tests/engine/directions.rs` in view: docs/directions.md tells how it fares elsewhere.
 const STRONG: f64 = 5.0;
 
 /// Sizes of priors that the data have chosen, as factors.
