@@ -176,3 +176,37 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
     assert!((step - 60e-6).abs() < 6e-6, "{json}");
     assert_eq!(json["unseen_directions"]["first"][0], serde_json::json!({"line": 7, "piece": "AFCF"}));
 }
+
+#[test]
+fn what_is_written_is_proved_and_what_was_not_corrected_is_not() {
+    let bench = Bench::new("verify", PROGRAM);
+    assert!(bench.run(&["-o", "out.nc"]).status.success());
+    let verify = |written: &str| {
+        let arguments = ["verify", "part.nc", written, "machine.ron", "--json", "found.json"];
+        command().current_dir(bench.0.path("")).args(arguments).output().expect("the program runs")
+    };
+    let out = verify("out.nc");
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert!(text(&out.stdout).starts_with("2 moves, 2 judged\n"), "{}", text(&out.stdout));
+    let out = verify("part.nc");
+    assert_eq!(out.status.code(), Some(1));
+    assert!(
+        text(&out.stderr).contains("part.nc: 2 moves not where part.nc means it"),
+        "{}",
+        text(&out.stderr)
+    );
+    let found: serde_json::Value =
+        serde_json::from_str(&bench.read("found.json").expect("written")).expect("JSON");
+    assert_eq!(found["departures"]["first"][1]["line"], 3, "{found}");
+}
+
+#[test]
+fn what_an_m_code_moves_is_taken_from_a_file() {
+    let bench = Bench::new("m_codes", "G21 G90\nG0 X10. Y20. Z30. A40. C50.\nM170\nG1 X60. F500\nM30\n");
+    let refused = bench.run(&["-o", "out.nc"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(text(&refused.stderr).contains("part.nc:4:1"), "{}", text(&refused.stderr));
+    bench.0.write("codes.ron", "{\"M170\": []}");
+    let out = bench.run(&["-o", "out.nc", "--m-codes", "codes.ron"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+}
