@@ -42,7 +42,7 @@ fn main() -> Result<()> {
     );
     // What is left is the rounding to 0.1 um.
     assert!(report.largest_correction_m.value > 1e-5 && report.largest_left_m.value < 5e-7);
-    assert!(report.out_of_travel.first.is_empty());
+    assert!(report.unknown_places.first.is_empty());
 
     // Only numbers and words of axes are touched.
     let lines = || PROGRAM.lines().zip(corrected.lines());

@@ -1,4 +1,6 @@
-//! The dialects, a file each: what is followed of them.
+//! The dialects, a file each: what is followed of them. Codes are in tenths, the underscore is their point: `54_1` is `G54.1`.
+
+#![allow(clippy::inconsistent_digit_grouping)]
 
 mod heidenhain;
 mod rs274;
