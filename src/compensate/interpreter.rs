@@ -173,26 +173,15 @@ impl<'a> Interpreter<'a> {
             let span = &block.words()[index].span;
             let code = block.text(span).to_ascii_uppercase();
             match self.control.setup().moved_by(&code) {
-                Some(axes) => {
-                    let moved = |address: &str| axes.iter().any(|axis| axis == address);
-                    let which: Vec<usize> = self
-                        .control
-                        .axes()
-                        .iter()
-                        .enumerate()
-                        .filter(|(_, a)| moved(a.address()))
-                        .map(|(i, _)| i)
-                        .collect();
-                    which.into_iter().for_each(|axis| self.places.lose(axis));
-                }
+                Some(axes) => self.lose_named(axes),
                 None if step.motion.is_some() || step.changes_tool => {
                     return refuse(block, span.start, CompensateFault::UnknownFunction { code });
                 }
                 None => self.places.lose_all(),
             }
         }
-        if step.changes_tool && self.control.setup().moved_by("M6").is_none() {
-            self.leave_slides();
+        if step.changes_tool {
+            self.leave_for_tool();
         }
         for axis in positioned(block) {
             let which = self.control.axes().iter().position(|a| a.address() == axis);
@@ -240,7 +229,7 @@ impl<'a> Interpreter<'a> {
         if tool {
             self.take_lengths();
             if self.tool.in_spindle() != in_spindle.as_deref() {
-                self.leave_slides();
+                self.leave_for_tool();
             } else {
                 // Some controls go by the new length at once.
                 self.leave_normal();
@@ -317,11 +306,20 @@ impl<'a> Interpreter<'a> {
         Ok(())
     }
 
-    /// A tool is changed where the machine does that; the linear axes are there then.
-    fn leave_slides(&mut self) {
-        for (i, _) in self.control.axes().iter().enumerate().filter(|(_, a)| !a.is_rotary()) {
-            self.places.lose(i);
+    /// A tool is changed where the machine does that; the linear axes are there then, or those that the set-up says.
+    fn leave_for_tool(&mut self) {
+        match self.control.setup().moved_by("M6") {
+            Some(axes) => self.lose_named(axes),
+            None => {
+                let linear = |i: &usize| !self.control.axes()[*i].is_rotary();
+                (0..self.places.len()).filter(linear).for_each(|i| self.places.lose(i));
+            }
         }
+    }
+
+    fn lose_named(&mut self, axes: &[String]) {
+        let named = |i: &usize| axes.iter().any(|axis| axis == self.control.axes()[*i].address());
+        (0..self.places.len()).filter(named).for_each(|i| self.places.lose(i));
     }
 
     /// The axis of the tool length is behind a cycle wherever the cycle leaves it.
