@@ -7,7 +7,7 @@ use super::solve::Problem;
 use super::unknowns::Unknowns;
 use super::{Layout, Placed, Sources, enough_to_start, is_of_setup, place};
 use crate::error::Result;
-use crate::machine::Machine;
+use crate::machine::{JointKind, Machine};
 use crate::recording::Recording;
 use crate::sensor::MOST_READINGS;
 use crate::units::{ByQuantity, Quantity};
@@ -18,12 +18,14 @@ use crate::variation::CONSTANT;
 const QUANTILE: f64 = 0.75;
 /// So many samples of a recording say how large its residuals are.
 const ENOUGH: u64 = 2000;
-/// Residuals beyond so many times what tolerances and instrument foretell contradict the machine file. The figure is a standard
-/// deviation: were it all due to one deviation, that one would lie thirty tolerances off, and a fit would find it.
-const BEYOND_TOLERANCES: f64 = 30.0;
-/// Residuals beyond this part of what the joints move the readings by are no error of the machine, but of what is said of its motion:
-/// a sound drive follows its command to better than this part of its travel, and play, load and heat stay below it too.
+/// Residuals beyond so many times what tolerances and instrument foretell contradict the machine file: were it all due to one deviation,
+/// that one would lie twenty tolerances off. `docs/reliability.md` shows how far sound recordings and mistakes are from it.
+const BEYOND_TOLERANCES: f64 = 20.0;
+/// Residuals beyond this part of what the joints move the readings by are no error of a machine, but of what is said of its motion: play,
+/// load and heat stay below it, even in arms that are driven by cables.
 const BEYOND_MOTION: f64 = 0.3;
+/// A point that a joint carries round is off by no more than its distance from the axis, rad.
+const ROUND: f64 = 1.0;
 
 /// How large what is left of one kind of reading in one recording is, and how large it could be, m or rad. Each is the size that three
 /// quarters of the samples stay below.
@@ -51,8 +53,12 @@ impl Plausibility {
 
     /// Residuals over the largest that could be true; beyond 1 they are nonsense.
     pub fn excess(&self) -> f64 {
-        let most = (BEYOND_TOLERANCES * self.foretold).max(BEYOND_MOTION * self.moved);
-        if most > 0.0 { self.left / most } else { 0.0 }
+        if self.most() > 0.0 { self.left / self.most() } else { 0.0 }
+    }
+
+    /// The largest residuals that could be true, m or rad.
+    pub fn most(&self) -> f64 {
+        (BEYOND_TOLERANCES * self.foretold).max(BEYOND_MOTION * self.moved)
     }
 
     /// What its figures measure.
@@ -79,7 +85,11 @@ pub(super) fn plausibility(problem: &Problem, unknowns: &Unknowns) -> Result<Vec
     let (machine, sources) = (problem.machine, problem.sources);
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     // Standard deviation of an even spread.
-    let spread: Vec<f64> = sources.ranges().iter().map(|(from, to)| (to - from) / 12f64.sqrt()).collect();
+    let spread = |c: usize, (from, to): &(f64, f64)| {
+        let most = if machine.command_joint(c).kind == JointKind::Revolute { ROUND } else { f64::INFINITY };
+        ((to - from) / 12f64.sqrt()).min(most)
+    };
+    let spread: Vec<f64> = sources.ranges().iter().enumerate().map(|(c, range)| spread(c, range)).collect();
     let mut sizes: Vec<ByQuantity<Sizes>> = vec![ByQuantity::default(); sources.all.len()];
     sources.pass(
         |index, stretch| {

@@ -84,13 +84,18 @@ pub fn search(
         };
         thinned.iter().map(with).collect()
     };
+    // Beside what could be true of the recordings as they are: a change of units changes what joints seem to move.
+    let excess = |all: &[Plausibility]| {
+        let of = |(changed, own): (&Plausibility, &Plausibility)| changed.left / own.most();
+        all.iter().zip(&fit.plausibility).map(of).fold(0.0, f64::max)
+    };
     // A change that makes a recording unreadable is not the mistake.
-    let excess = |change: &Change| {
-        let all = changed(change).and_then(|recordings| as_declared(machine, &recordings)).ok()?;
-        worst(&all).map(Plausibility::excess)
+    let tried = |change: &Change| {
+        let recordings = changed(change).ok()?;
+        Some(excess(&as_declared(machine, &recordings).ok()?))
     };
     let mut scored: Vec<(f64, &Change)> =
-        all.par_iter().filter_map(|change| Some((excess(change)?, change))).collect();
+        all.par_iter().filter_map(|change| Some((tried(change)?, change))).collect();
     scored.sort_by(|a, b| a.0.total_cmp(&b.0));
     let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
     let alike: Vec<&(f64, &Change)> =
@@ -98,14 +103,14 @@ pub fn search(
     let mut mistakes = Vec::new();
     if least <= 1.0 && alike.len() <= MOST {
         for (_, change) in alike {
-            let Ok((_, fit)) = calibrate(machine, &changed(change)?, CalibrateOptions::default()) else {
+            let Ok((_, mended)) = calibrate(machine, &changed(change)?, CalibrateOptions::default()) else {
                 continue;
             };
-            let own = fit
+            let own = mended
                 .plausibility
                 .iter()
                 .find(|p| (&p.recording, p.of_angles) == (&left.recording, left.of_angles));
-            let (Some(own), true) = (own, fit.plausibility.iter().all(Plausibility::holds)) else { continue };
+            let (Some(own), true) = (own, excess(&mended.plausibility) <= 1.0) else { continue };
             mistakes.push(Mistake {
                 what: change.in_words(machine),
                 mend: change.mend(machine),
