@@ -73,8 +73,12 @@ const LENGTHS: [f64; 3] = [0.5, 1.0, 2.0];
 const ANGLES: [f64; 3] = [0.5, 1.0, 2.0];
 /// Rounds of choosing factors; the second sees what the first has changed.
 const SIZE_ROUNDS: usize = 2;
+/// Readings for each unknown from which the noise can be taken without the prior: as many are then left over as are used up.
+const READINGS_EACH: u64 = 2;
+/// A fit whose noise falls below this part without the prior was held back by it: three quarters of what was left were geometry.
+const HELD_BACK: f64 = 0.5;
 /// Rounds of re-estimating the noise from the residuals.
-const NOISE_ROUNDS: usize = 12;
+const NOISE_ROUNDS: usize = 30;
 
 /// Identifies the deviations of `machine` from recordings, which may differ in kind and set-up.
 ///
@@ -153,7 +157,7 @@ fn attempt(
         let play = |j| varying.directions.as_ref().and_then(|directions| directions.play(machine, j));
         problem.motions = Motions::new(machine, &sources.ranges(), model.error_motions, play);
     }
-    let mut found = settle(&problem, options.solver, placed.unknowns, noise)?;
+    let mut found = settle_from_afar(&mut problem, options.solver, placed.unknowns, noise)?;
     let room = problem.motions.clone();
     let fitting = |but_play: f64| Layout::new(machine, &sources, varying, but_play);
     // Without room for error motions, those would speak for direction parts.
@@ -397,6 +401,42 @@ fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>)
     }
     solution.steps = steps;
     Ok(Found { solution, noise, seen })
+}
+
+/// As [`settle`], but not held back by the prior. Far from the optimum the residuals are large; taken for noise, they let the tolerances
+/// outweigh the data, and nothing moves. Where what is left could still be geometry, the noise is taken apart from the prior: from an
+/// optimum without it, from which the fit with it starts again.
+fn settle_from_afar(
+    problem: &mut Problem,
+    solver: Solver,
+    start: Unknowns,
+    noise: Vec<Noise>,
+) -> Result<Found> {
+    let found = settle(problem, solver, start, noise)?;
+    let enough = problem.sources.readings() >= READINGS_EACH * problem.layout.len as u64;
+    let constant = problem.varying.is_constant() && problem.motions.len() == 0;
+    if !(problem.prior
+        && constant
+        && enough
+        && plausible::may_be_geometry(problem, &found.solution.unknowns)?)
+    {
+        return Ok(found);
+    }
+    problem.prior = false;
+    let without = settle(problem, solver, found.solution.unknowns.clone(), found.noise.clone());
+    problem.prior = true;
+    let without = without?;
+    let held_back = |with: &Found, without: &Found| {
+        let less = |(with, without): (&Noise, &Noise)| {
+            without.m < HELD_BACK * with.m || without.rad < HELD_BACK * with.rad
+        };
+        with.seen.iter().zip(&without.seen).any(less)
+    };
+    if !held_back(&found, &without) {
+        return Ok(found);
+    }
+    let again = settle(problem, solver, without.solution.unknowns, without.noise)?;
+    Ok(if held_back(&found, &again) { again } else { found })
 }
 
 /// Noise of every source from the residuals of its kind and stated `sigma`, freed of the parameters that the fit used up.

@@ -67,6 +67,16 @@ impl Plausibility {
     }
 }
 
+/// Residuals below this part of what the tolerances make are no geometry that a fit has missed: it would be one of the smallest
+/// deviations, and those do not hold a fit back.
+const GEOMETRY: f64 = 0.1;
+
+/// Whether what is left is large enough to be geometry.
+pub(super) fn may_be_geometry(problem: &Problem, unknowns: &Unknowns) -> Result<bool> {
+    let all = plausibility(problem, unknowns)?;
+    Ok(all.iter().any(|p| p.left > GEOMETRY * p.foretold))
+}
+
 /// The worst of several.
 pub fn worst(all: &[Plausibility]) -> Option<&Plausibility> {
     all.iter().max_by(|a, b| a.excess().total_cmp(&b.excess()))

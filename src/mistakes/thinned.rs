@@ -31,8 +31,6 @@ pub(super) struct Thinned {
     /// Units in which the file states commands and readings, where it has such columns.
     pub units: Vec<Option<Unit>>,
     pub value_units: Vec<Unit>,
-    /// Whether the header fixes a command.
-    pub fixed: Vec<bool>,
     /// By place in the thinned recording: the sample in the middle and `SHIFTS` neighbours on each side.
     windows: Vec<Vec<Sample>>,
     /// The samples that a change works on.
@@ -76,7 +74,6 @@ impl Thinned {
             measurement: recording.header().measurement,
             units: (0..commands).map(|c| unit(Role::Command(c))).collect(),
             value_units: (0..values).filter_map(|i| unit(Role::Value(i))).collect(),
-            fixed: recording.fixed().iter().map(Option::is_some).collect(),
             samples: windows.iter().map(middle).collect(),
             windows,
         })
