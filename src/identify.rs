@@ -31,8 +31,8 @@ inner! {
 }
 pub(crate) use evaluator::{EXTRAS, Evaluator, Moment, Values};
 pub use fit::{
-    BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit,
-    Suspect,
+    BeforeAfter, COMPONENTS, CoefficientFit, Combination, FarOff, Fit, HeldOut, ParameterFit, RecordingFit,
+    SetupFit, Suspect,
 };
 pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
@@ -77,6 +77,8 @@ const SIZE_ROUNDS: usize = 2;
 const READINGS_EACH: u64 = 2;
 /// A fit whose noise falls below this part without the prior was held back by it: three quarters of what was left were geometry.
 const HELD_BACK: f64 = 0.5;
+/// Whatever lies so many tolerances off is no deviation but another machine; `docs/reliability.md`.
+const OTHER_MACHINE: f64 = 100.0;
 /// Rounds of re-estimating the noise from the residuals.
 const NOISE_ROUNDS: usize = 30;
 
@@ -436,7 +438,9 @@ fn settle_from_afar(
         return Ok(found);
     }
     let again = settle(problem, solver, without.solution.unknowns, without.noise)?;
-    Ok(if held_back(&found, &again) { again } else { found })
+    let is_deviation = problem.farthest(&again.solution.unknowns) <= OTHER_MACHINE;
+    let explains = || plausible::explains(problem, &found.solution.unknowns, &again.solution.unknowns);
+    Ok(if held_back(&found, &again) && is_deviation && explains()? { again } else { found })
 }
 
 /// Noise of every source from the residuals of its kind and stated `sigma`, freed of the parameters that the fit used up.

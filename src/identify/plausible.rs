@@ -77,6 +77,15 @@ pub(super) fn may_be_geometry(problem: &Problem, unknowns: &Unknowns) -> Result<
     Ok(all.iter().any(|p| p.left > GEOMETRY * p.foretold))
 }
 
+/// Whether a fit from afar may take the place of one that tolerances hold back: where that one is nonsense, only if it leaves no more than
+/// deviations of the size of the tolerances would, since a wrong model far from its file explains half of anything.
+pub(super) fn explains(problem: &Problem, held_back: &Unknowns, from_afar: &Unknowns) -> Result<bool> {
+    if plausibility(problem, held_back)?.iter().all(Plausibility::holds) {
+        return Ok(true);
+    }
+    Ok(plausibility(problem, from_afar)?.iter().all(|p| p.left <= p.foretold))
+}
+
 /// The worst of several.
 pub fn worst(all: &[Plausibility]) -> Option<&Plausibility> {
     all.iter().max_by(|a, b| a.excess().total_cmp(&b.excess()))

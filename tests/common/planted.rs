@@ -96,8 +96,8 @@ pub const PLANTED: [Planted; 24] = [
     planted(
         "bc_head_table",
         Sensor::Position,
-        Times(&["z"], 1e3 * INCH),
-        "Z in inch, called mm",
+        Times(&["z"], 1.0 / INCH),
+        "Z in inch, called m",
         "z read in in instead of m",
     ),
     planted(
@@ -112,7 +112,7 @@ pub const PLANTED: [Planted; 24] = [
         Sensor::Position,
         Swapped("b", "c"),
         "columns b and c swapped",
-        "b and c swapped",
+        "c and b swapped",
     ),
     planted(
         "kuka_iiwa14",
