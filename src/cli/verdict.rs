@@ -69,7 +69,7 @@ fn in_words(nonsense: &Nonsense) -> String {
     if nonsense.mistakes.is_empty() {
         let _ = write!(
             text,
-            "\n  none of {} mistakes explains it alone; tried: {}",
+            "\n  none of {} mistakes explains it, alone or in pairs; tried: {}",
             nonsense.tried, nonsense.kinds
         );
     }

@@ -14,6 +14,8 @@ use crate::recording::Recording;
 /// Mistakes that leave no more than this many times the least are not told apart: deviations of the size of the tolerances, which the
 /// trials do not fit, make a factor of two or so.
 const ALIKE: f64 = 5.0;
+/// So many mistakes, those that leave least, are tried together with every other one.
+const BEGUN: usize = 12;
 /// More that cannot be told apart are no name.
 const MOST: usize = 4;
 
@@ -73,50 +75,101 @@ pub fn search(
     let Some(left) = worst(&fit.plausibility).filter(|worst| !worst.holds()).cloned() else {
         return Ok(None);
     };
-    progress("looking for a mistake that explains it");
     let thinned = recordings.iter().map(Thinned::of).collect::<Result<Vec<_>>>()?;
     let all = changes(machine, &thinned);
-    let changed = |change: &Change| -> Result<Vec<Recording>> {
-        let with = |thinned: &Thinned| {
+    let trial = Trial { machine, thinned: &thinned, fit, left: &left };
+    progress("looking for a mistake that explains it");
+    let ones: Vec<Vec<&Change>> = all.iter().map(|change| vec![change]).collect();
+    let scored = trial.scored(ones);
+    let mut mistakes = trial.named(&scored)?;
+    let mut tried = scored.len();
+    if mistakes.is_empty() {
+        progress("looking for two mistakes that explain it");
+        let begun = scored.iter().take(BEGUN).enumerate();
+        let two = begun.flat_map(|(i, (_, one))| {
+            let known = &scored[..=i];
+            let new = all.iter().filter(move |change| !known.iter().any(|(_, own)| own[0] == *change));
+            new.map(|other| in_order(one[0], other))
+        });
+        let scored = trial.scored(two.collect());
+        mistakes = trial.named(&scored)?;
+        tried += scored.len();
+    }
+    Ok(Some(Nonsense { left, mistakes, tried, kinds: TRIED.into() }))
+}
+
+/// What moves rows takes them from the recording as it is, so it comes first.
+fn in_order<'a>(one: &'a Change, other: &'a Change) -> Vec<&'a Change> {
+    let moves =
+        |change: &Change| matches!(change, Change::Backwards | Change::Rows(_) | Change::CommandRows(..));
+    if moves(other) { vec![other, one] } else { vec![one, other] }
+}
+
+/// Mistakes by what is left without them, over what could be true.
+type Scored<'a> = Vec<(f64, Vec<&'a Change>)>;
+
+/// What mistakes are tried on.
+struct Trial<'a> {
+    machine: &'a Machine,
+    thinned: &'a [Thinned],
+    /// Of the recordings as they are, and the worst of it.
+    fit: &'a Fit,
+    left: &'a Plausibility,
+}
+
+impl Trial<'_> {
+    /// The recordings without these mistakes.
+    fn without(&self, mistakes: &[&Change]) -> Result<Vec<Recording>> {
+        let one = |thinned: &Thinned| {
             let mut other = thinned.clone();
-            other.samples = change.applied(thinned);
-            other.recording(machine)
+            mistakes.iter().for_each(|change| other.samples = change.applied(&other));
+            other.recording(self.machine)
         };
-        thinned.iter().map(with).collect()
-    };
-    // Beside what could be true of the recordings as they are: a change of units changes what joints seem to move.
-    let excess = |all: &[Plausibility]| {
+        self.thinned.iter().map(one).collect()
+    }
+
+    /// The largest residual over what could be true of the recordings as they are: a change of units changes what joints seem to move.
+    fn excess(&self, all: &[Plausibility]) -> f64 {
         let of = |(changed, own): (&Plausibility, &Plausibility)| changed.left / own.most();
-        all.iter().zip(&fit.plausibility).map(of).fold(0.0, f64::max)
-    };
-    // A change that makes a recording unreadable is not the mistake.
-    let tried = |change: &Change| {
-        let recordings = changed(change).ok()?;
-        Some(excess(&as_declared(machine, &recordings).ok()?))
-    };
-    let mut scored: Vec<(f64, &Change)> =
-        all.par_iter().filter_map(|change| Some((tried(change)?, change))).collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
-    let alike: Vec<&(f64, &Change)> =
-        scored.iter().take_while(|(excess, _)| *excess <= ALIKE * least).collect();
-    let mut mistakes = Vec::new();
-    if least <= 1.0 && alike.len() <= MOST {
-        for (_, change) in alike {
-            let Ok((_, mended)) = calibrate(machine, &changed(change)?, CalibrateOptions::default()) else {
+        all.iter().zip(&self.fit.plausibility).map(of).fold(0.0, f64::max)
+    }
+
+    /// What each leaves of the machine as declared, best first. A change that makes a recording unreadable is not the mistake.
+    fn scored<'b>(&self, all: Vec<Vec<&'b Change>>) -> Scored<'b> {
+        let score = |mistakes: &[&Change]| {
+            let recordings = self.without(mistakes).ok()?;
+            Some(self.excess(&as_declared(self.machine, &recordings).ok()?))
+        };
+        let mut scored: Scored =
+            all.into_par_iter().filter_map(|mistakes| Some((score(&mistakes)?, mistakes))).collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        scored
+    }
+
+    /// Those that explain the recordings and cannot be told apart, calibrated without them.
+    fn named(&self, scored: &Scored) -> Result<Vec<Mistake>> {
+        let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
+        let alike: Vec<_> = scored.iter().take_while(|(excess, _)| *excess <= ALIKE * least).collect();
+        let better = least <= 1.0 && ALIKE * least <= self.left.excess();
+        let mut named = Vec::new();
+        for (_, mistakes) in alike.iter().filter(|_| better && alike.len() <= MOST) {
+            let recordings = self.without(mistakes)?;
+            let Ok((_, mended)) = calibrate(self.machine, &recordings, CalibrateOptions::default()) else {
                 continue;
             };
-            let own = mended
-                .plausibility
-                .iter()
-                .find(|p| (&p.recording, p.of_angles) == (&left.recording, left.of_angles));
-            let (Some(own), true) = (own, excess(&mended.plausibility) <= 1.0) else { continue };
-            mistakes.push(Mistake {
-                what: change.in_words(machine),
-                mend: change.mend(machine),
-                left: own.left,
-            });
+            let key = |p: &Plausibility| (p.recording.clone(), p.of_angles);
+            let own = mended.plausibility.iter().find(|p| key(p) == key(self.left));
+            if let Some(own) = own.filter(|_| self.excess(&mended.plausibility) <= 1.0) {
+                let words = |word: fn(&Change, &Machine) -> String| -> Vec<String> {
+                    mistakes.iter().map(|change| word(change, self.machine)).collect()
+                };
+                named.push(Mistake {
+                    what: words(Change::in_words).join(" and "),
+                    mend: words(Change::mend).join(", and "),
+                    left: own.left,
+                });
+            }
         }
+        Ok(named)
     }
-    Ok(Some(Nonsense { left, mistakes, tried: all.len(), kinds: TRIED.into() }))
 }
