@@ -77,6 +77,8 @@ const SIZE_ROUNDS: usize = 2;
 const READINGS_EACH: u64 = 2;
 /// A fit whose noise falls below this part without the prior was held back by it: three quarters of what was left were geometry.
 const HELD_BACK: f64 = 0.5;
+/// Tolerances pull at a deviation of so many of them, which it may keep from the optimum.
+const FAR_OFF: f64 = 5.0;
 /// Whatever lies so many tolerances off is no deviation but another machine; `docs/reliability.md`.
 const OTHER_MACHINE: f64 = 100.0;
 /// Rounds of re-estimating the noise from the residuals.
@@ -417,11 +419,11 @@ fn settle_from_afar(
     let found = settle(problem, solver, start, noise)?;
     let enough = problem.sources.readings() >= READINGS_EACH * problem.layout.len as u64;
     let constant = problem.varying.is_constant() && problem.motions.len() == 0;
-    if !(problem.prior
-        && constant
-        && enough
-        && plausible::may_be_geometry(problem, &found.solution.unknowns)?)
-    {
+    if !(problem.prior && constant && enough) {
+        return Ok(found);
+    }
+    let pulled = problem.farthest(&found.solution.unknowns) > FAR_OFF;
+    if !pulled && !plausible::may_be_geometry(problem, &found.solution.unknowns)? {
         return Ok(found);
     }
     problem.prior = false;
