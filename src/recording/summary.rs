@@ -14,6 +14,9 @@ const COUPLING_TOLERANCE: f64 = 1e-6;
 /// A command that moves by no more than this stands still, m or rad.
 const STANDSTILL: f64 = 1e-9;
 
+/// Fewer samples do not show how a clock runs.
+const STEADY: u64 = 30;
+
 /// A gap in time longer than this many median steps is a pause.
 const PAUSE_STEPS: f64 = 5.0;
 
@@ -136,7 +139,7 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
         Some((step, pause, count)) => (Some(step), Some(pause), count),
         None => (None, None, 0),
     };
-    if pauses > 0 {
+    if pauses > 0 && samples >= STEADY {
         warn_of_jump(longest, time, &mut warnings);
     }
     Ok(Summary {

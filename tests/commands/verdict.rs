@@ -9,6 +9,17 @@ fn bad(name: &str) -> String {
     format!("tests/bad/mistakes/{name}.csv")
 }
 
+/// Where a fit of nonsense ends may differ from processor to processor.
+fn without_figures(line: &str) -> String {
+    if let Some((words, _)) = line.split_once("belong together: ") {
+        return format!("{words}belong together: ...");
+    }
+    match line.rsplit_once("would be left instead of ") {
+        Some((words, _)) => format!("{words}would be left instead of ..."),
+        None => line.to_string(),
+    }
+}
+
 #[test]
 fn every_mistake_has_its_message() {
     let folder = Folder::new("mistakes");
@@ -16,8 +27,10 @@ fn every_mistake_has_its_message() {
     let files = std::fs::read_dir("tests/bad/mistakes").expect("a folder").count();
     assert_eq!(files, names.len());
     let output = folder.path("out.ron");
-    let message =
-        |name: &str| format!("{name}\n{}", fails(1, &["calibrate", MACHINE, &bad(name), "-o", &output]));
+    let message = |name: &str| {
+        let text = fails(1, &["calibrate", MACHINE, &bad(name), "-o", &output]);
+        format!("{name}\n{}\n", text.lines().map(without_figures).collect::<Vec<_>>().join("\n"))
+    };
     assert_snapshot!(names.map(message).join("\n"));
     assert!(folder.names().is_empty(), "{:?}", folder.names());
 }
