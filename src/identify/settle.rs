@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::units::Rms;
 
 /// Rounds of re-estimating the noise from the residuals.
-const NOISE_ROUNDS: usize = 30;
+const NOISE_ROUNDS: usize = 12;
 /// Readings for each unknown from which the noise can be taken without the prior: as many are then left over as are used up.
 const READINGS_EACH: u64 = 2;
 /// A fit whose noise falls below this part without the prior was held back by it: three quarters of what was left were geometry.
