@@ -13,6 +13,7 @@ mod output;
 mod part;
 mod predict;
 mod simulate;
+mod verdict;
 mod verify;
 
 use std::process::ExitCode;

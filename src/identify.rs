@@ -6,6 +6,7 @@
 mod align;
 mod evaluator;
 mod evidence;
+mod far_off;
 mod fit;
 mod information;
 mod judge;
@@ -15,7 +16,9 @@ mod normal;
 mod optimum;
 mod options;
 mod places;
+mod plausible;
 mod set_up_values;
+mod settle;
 mod solve;
 mod source;
 mod stretch;
@@ -29,6 +32,7 @@ inner! {
     use information::Information;
 }
 pub(crate) use evaluator::{EXTRAS, Evaluator, Moment, Values};
+pub use far_off::FarOff;
 pub use fit::{
     BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit,
     Suspect,
@@ -38,7 +42,9 @@ pub use loss::Loss;
 pub(crate) use optimum::{optimum, sources};
 pub use options::{Approach, CalibrateOptions, ErrorModel};
 pub(crate) use places::Places;
+pub use plausible::{Plausibility, as_declared, worst};
 pub(crate) use set_up_values::SetUpValues;
+pub(crate) use settle::Found;
 pub use solve::{Solver, Stop};
 pub(crate) use source::{Known, Source, Sources, channel};
 pub(crate) use stretch::{Beginning, Memories, Stretch, by_dyad, stretches};
@@ -56,8 +62,8 @@ use crate::variation::{Variation, Varying};
 use crate::wording;
 use evidence::Sizes;
 use information::Information as Info;
-use noise::{Noise, with_stated};
-use normal::{Normal, Sums, Tally};
+use noise::Noise;
+use settle::{settle, settle_from_afar};
 use solve::{Problem, Solution};
 use thin::Thin;
 use unknowns::Block;
@@ -71,8 +77,6 @@ const LENGTHS: [f64; 3] = [0.5, 1.0, 2.0];
 const ANGLES: [f64; 3] = [0.5, 1.0, 2.0];
 /// Rounds of choosing factors; the second sees what the first has changed.
 const SIZE_ROUNDS: usize = 2;
-/// Rounds of re-estimating the noise from the residuals.
-const NOISE_ROUNDS: usize = 12;
 
 /// Identifies the deviations of `machine` from recordings, which may differ in kind and set-up.
 ///
@@ -151,7 +155,7 @@ fn attempt(
         let play = |j| varying.directions.as_ref().and_then(|directions| directions.play(machine, j));
         problem.motions = Motions::new(machine, &sources.ranges(), model.error_motions, play);
     }
-    let mut found = settle(&problem, options.solver, placed.unknowns, noise)?;
+    let mut found = settle_from_afar(&mut problem, options.solver, placed.unknowns, noise)?;
     let room = problem.motions.clone();
     let fitting = |but_play: f64| Layout::new(machine, &sources, varying, but_play);
     // Without room for error motions, those would speak for direction parts.
@@ -332,21 +336,6 @@ pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
     })
 }
 
-/// A solution and the noise that it was weighted with.
-pub(crate) struct Found {
-    pub solution: Solution,
-    pub noise: Vec<Noise>,
-    /// Noise that the residuals show, by recording, before a stated `sigma` overrides it.
-    pub seen: Vec<Noise>,
-}
-
-impl Found {
-    /// Root mean square of residual lengths and angles over all samples, m and rad.
-    pub fn rms(&self) -> Rms {
-        normal::rms_over(&self.solution.normal.tallies)
-    }
-}
-
 /// Set-ups as found before anything of the machine is identified.
 struct Placed {
     solution: Solution,
@@ -369,62 +358,6 @@ fn place(problem: &mut Problem, mut start: Unknowns) -> Result<Placed> {
         solution = problem.solve(Solver::LevenbergMarquardt, solution.unknowns, &noise)?;
     }
     Ok(Placed { solution, noise, thin })
-}
-
-/// Solves, takes the noise from what is left, and solves again until the noise no longer changes.
-fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>) -> Result<Found> {
-    let mut noise = noise;
-    let mut solution = problem.solve(solver, start.clone(), &noise)?;
-    let mut steps = solution.steps;
-    let mut seen = noise.clone();
-    for _ in 0..NOISE_ROUNDS {
-        seen = noise_left(problem, &solution.normal, &noise);
-        let next = with_stated(problem.sources, &seen);
-        let changed = noise.iter().zip(&next).any(|(a, b)| {
-            let differs = |x: f64, y: f64| (x - y).abs() > 3e-3 * y;
-            differs(a.m, b.m) || differs(a.rad, b.rad)
-        });
-        if !changed {
-            break;
-        }
-        noise = next;
-        // The named rivals regularise by their number of steps, so they always start afresh.
-        let from = if solver.uses_prior() { solution.unknowns.clone() } else { start.clone() };
-        solution = problem.solve(solver, from, &noise)?;
-        steps += solution.steps;
-    }
-    solution.steps = steps;
-    Ok(Found { solution, noise, seen })
-}
-
-/// Noise of every source from the residuals of its kind and stated `sigma`, freed of the parameters that the fit used up.
-fn noise_left(problem: &Problem, normal: &Normal, present: &[Noise]) -> Vec<Noise> {
-    let sources = &problem.sources.all;
-    let free = problem.layout.mask(|_| true);
-    let used = if problem.free == free {
-        Info::new(&normal.matrix, problem.layout, problem.prior, problem.frozen.clone()).used
-    } else {
-        problem.free.iter().filter(|f| **f).count() as f64
-    } + normal.used_by_motions;
-    let kinds: Vec<_> = sources.iter().map(source::Source::noise_group).collect();
-    let rows =
-        normal.tallies.iter().map(|t| t.residuals.m.inliers + t.residuals.rad.inliers).sum::<u64>() as f64;
-    // Every scalar row bears its part of the parameters that are used up.
-    let left = (1.0 - used / rows).max(0.05);
-    kinds
-        .iter()
-        .zip(present)
-        .map(|(kind, present)| {
-            let mut sum = Tally::default();
-            let own = kinds.iter().zip(&normal.tallies).filter(|(k, _)| *k == kind);
-            own.for_each(|(_, tally)| sum.add(tally));
-            let scale = |sums: &Sums, present: f64| match sums.inliers {
-                0 => present,
-                n => (sums.inlier_squares / (n as f64 * left)).sqrt().max(thin::FINEST),
-            };
-            sum.residuals.zip(*present).map(|(sums, present)| scale(&sums, present))
-        })
-        .collect()
 }
 
 /// Refuses what cannot be identified at all.

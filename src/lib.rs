@@ -41,6 +41,7 @@
 //! | `calibration` | [`CalibratedMachine`]: a machine file with its deviations |
 //! | [`location`] | the same geometry as ISO 230-1 location errors |
 //! | [`identify`] | from recordings to deviations: alignment, solvers, what the data see |
+//! | [`mistakes`] | recordings and machines that do not belong together, and why |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
 //! | `rivals` | identification by other schemes, and a filter, judged side by side |
@@ -136,6 +137,7 @@ pub mod inverse;
 pub mod lie;
 pub mod location;
 pub mod machine;
+pub mod mistakes;
 #[cfg(not(feature = "internals"))]
 mod motion;
 #[cfg(feature = "internals")]

@@ -17,6 +17,7 @@ use super::output::{
     Failure, Kind, Outcome, angle, check_outputs, count, length, open_machine, open_recordings, table,
     write_whole,
 };
+use super::verdict;
 
 #[derive(Clone, Copy, ValueEnum)]
 enum SolverWord {
@@ -88,6 +89,9 @@ pub(crate) struct Args {
     /// List every component of every deviation, not only those that the data determine
     #[arg(long)]
     all: bool,
+    /// Go on although recordings and machine do not belong together
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     common: Common,
 }
@@ -172,9 +176,13 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let found = calibrate_model(&machine, &recordings, &args.model(&machine)?, args.options(), &|text| {
         progress.say(text)
     });
-    drop(progress);
     let (calibrated, fit) = found?;
+    let note = verdict::of_fit(&machine, &recordings, &fit, args.force, &|text| progress.say(text))?;
+    drop(progress);
     let mut text = render(&fit, args.all);
+    if let Some(note) = note {
+        let _ = writeln!(text, "note: {note}");
+    }
     if let Some(path) = &args.output {
         write_machine(path, &calibrated)?;
         let _ = writeln!(text, "\nwritten to {}", path.display());

@@ -12,6 +12,7 @@ use super::calibrate::{positive, relative};
 use super::output::{
     Failure, Outcome, angle, check_outputs, count, length, open_machine, open_recordings, table,
 };
+use super::verdict;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -45,6 +46,9 @@ pub(crate) struct Args {
     /// Find the set-ups of the recordings to judge by again, from those recordings
     #[arg(long)]
     fit_setup: bool,
+    /// Go on although recordings and machine do not belong together
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     common: Common,
 }
@@ -93,6 +97,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         fit_setup: args.fit_setup,
     };
     let progress = args.common.progress();
+    let note = verdict::beforehand(&machine, &fit_on, args.force, &|text| progress.say(text))?;
     let mut verdicts = Vec::new();
     for (name, rival) in &rivals {
         progress.say(name);
@@ -103,7 +108,11 @@ pub(crate) fn run(args: &Args) -> Outcome {
     for recording in &fit_on {
         fitted_samples += recording.scan()?.samples;
     }
-    args.common.say(&render(machine.name(), fitted_samples, judged_by, truth.is_some(), &verdicts));
+    let mut text = render(machine.name(), fitted_samples, judged_by, truth.is_some(), &verdicts);
+    if let Some(note) = note {
+        text.push_str(&format!("note: {note}\n"));
+    }
+    args.common.say(&text);
     args.common.write_json(&Comparison {
         machine: machine.name(),
         fitted_samples,

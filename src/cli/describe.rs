@@ -4,10 +4,12 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
+use crate::chain::Chain;
 use crate::describe::{Description, DyadDescription, describe};
 use crate::identify::reach;
-use crate::lie::{Twist, Vec3};
+use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::JointKind;
+use crate::units::{Quantity, amount};
 use serde_json::{Value, json};
 
 use super::Common;
@@ -24,6 +26,9 @@ pub(crate) struct Args {
     /// Recordings: how many combinations they see, all together, before anything is identified
     #[arg(value_name = "REC.csv")]
     recordings: Vec<PathBuf>,
+    /// Where t is in w besides at home: joints with their displacements, those left out at 0, such as x=100mm,c=30deg
+    #[arg(long, value_name = "JOINT=AMOUNT", value_delimiter = ',', allow_hyphen_values = true)]
+    at: Vec<String>,
     /// List every combination that a measurement does not see
     #[arg(long)]
     unseen: bool,
@@ -37,6 +42,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let description = describe(calibrated.machine());
     let mut text = render(&description, args.unseen);
     let mut result = serde_json::to_value(&description).map_err(|e| Failure::Answer(e.to_string()))?;
+    let poses = poses(&calibrated, &args.at)?;
+    text.push_str(&render_poses(&poses));
+    let data = |(name, pose): &(String, Pose<f64>)| json!({"at": name, "translation_m": pose.translation.0, "rotation_rad": pose.rotation_vector().0});
+    result["w_from_t"] = poses.iter().map(data).collect();
     if calibrated.samples() > 0 {
         text.push_str(&render_calibration(&calibrated));
         result["calibration"] = calibration(&calibrated);
@@ -58,6 +67,45 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     args.common.say(&text);
     args.common.write_json(&result)
+}
+
+/// Where `t` is in `w` with all commands at zero, and with those asked for.
+fn poses(calibrated: &CalibratedMachine, at: &[String]) -> Outcome<Vec<(String, Pose<f64>)>> {
+    let machine = calibrated.machine();
+    let chain = Chain::new(machine, calibrated.deviations());
+    let mut q = vec![0.0; machine.commands().len()];
+    let mut poses = vec![("home, all commands 0".to_string(), chain.w_from_t(&q))];
+    for text in at {
+        let (name, size) = text.split_once('=').unwrap_or((text, ""));
+        let wrong = |what: String, mend: String| Failure::Told { what: format!("--at {text}: {what}"), mend };
+        let Some(c) = machine.commands().iter().position(|own| own == name.trim()) else {
+            let mend = format!("name one of: {}", machine.commands().join(", "));
+            return Err(wrong(format!("\"{}\" is no joint of {}", name.trim(), machine.name()), mend));
+        };
+        let (quantity, unit) = match machine.command_joint(c).kind {
+            JointKind::Prismatic => (Quantity::Length, "mm"),
+            JointKind::Revolute => (Quantity::Angle, "deg"),
+        };
+        let mend = || format!("write the joint with its displacement, such as {}=10{unit}", name.trim());
+        q[c] = amount(size, quantity).map_err(|what| wrong(what, mend()))?;
+    }
+    if !at.is_empty() {
+        poses.push((at.join(", "), chain.w_from_t(&q)));
+    }
+    Ok(poses)
+}
+
+fn render_poses(poses: &[(String, Pose<f64>)]) -> String {
+    let mut text = "\npose of t in w (origin, rotation vector)\n".to_string();
+    let rows: Vec<Vec<String>> = (poses.iter())
+        .map(|(name, pose)| {
+            let at = format!("at {} mm", triple(pose.translation.0, Kind::Length));
+            let turned = format!("turned {} deg", triple(pose.rotation_vector().0, Kind::Angle));
+            vec![name.clone(), at, turned]
+        })
+        .collect();
+    text.push_str(&table("  ", &[], &rows));
+    text
 }
 
 /// The description as people read it.

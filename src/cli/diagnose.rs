@@ -13,6 +13,7 @@ use crate::machine::Machine;
 
 use super::Common;
 use super::output::{Outcome, check_outputs, open_machine, open_recordings, write_whole};
+use super::verdict;
 pub(crate) use text::render;
 
 #[derive(clap::Args)]
@@ -35,6 +36,9 @@ pub(crate) struct Args {
     /// Where to write the report with its pictures: one HTML file
     #[arg(long, value_name = "OUT.html")]
     report: Option<PathBuf>,
+    /// Go on although recordings and machine do not belong together
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     common: Common,
 }
@@ -59,6 +63,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     let progress = args.common.progress();
     let request = DiagnoseOptions::default();
+    let note = verdict::beforehand(&machine, &recordings, args.force, &|text| progress.say(text))?;
     let found = diagnose(&machine, &recordings, &library, &request, &|text| progress.say(text)).and_then(
         |mut found| {
             let wanted = args.output.is_some() || !found.findings.is_empty();
@@ -74,6 +79,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     drop(progress);
     let (diagnosis, model) = found?;
     let mut text = render(&diagnosis);
+    if let Some(note) = note {
+        let _ = writeln!(text, "note: {note}");
+    }
     for recording in &recordings {
         for warning in recording.warnings() {
             let _ = writeln!(text, "note: {}: {warning}", recording.name());

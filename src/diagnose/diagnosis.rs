@@ -13,7 +13,7 @@ use super::side_branches::UnseenSideBranch;
 use super::traces::Traces;
 use super::unexplained::Unexplained;
 use crate::effects::StoredEffect;
-use crate::identify::BeforeAfter;
+use crate::identify::{BeforeAfter, FarOff};
 use crate::location::LocationErrors;
 use crate::units::{ByQuantity, field_by_quantity};
 
@@ -63,6 +63,9 @@ pub struct Diagnosis {
     /// What hangs on the machine beside its chain, and no recording says how it stood.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unseen_side_branches: Vec<UnseenSideBranch>,
+    /// Frames that lie far from where the machine file has them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub far_off: Vec<FarOff>,
     /// Rows left out because a number was missing.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub dropped: u64,

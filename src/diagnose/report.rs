@@ -153,6 +153,7 @@ pub(super) fn report(
         named,
         not_tried: Vec::new(),
         unseen_side_branches: Vec::new(),
+        far_off: linear.fit.far_off(),
         dropped: linear.fit.dropped,
         outliers: Vec::new(),
         rms_without_outliers: ByQuantity::default(),

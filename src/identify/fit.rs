@@ -7,6 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::evaluator::{Evaluator, Moment};
 use super::judge::{Figures, PieceFit, judge};
 use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
+use super::plausible::{Plausibility, plausibility};
 use super::solve::Problem;
 use super::source::{Known, Which};
 use super::unknowns::{Block, Role, Unknowns};
@@ -86,6 +87,9 @@ pub struct Fit {
     /// Coefficients of the terms.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coefficients: Vec<CoefficientFit>,
+    /// By recording and quantity, whether what is left can be true.
+    #[serde(default)]
+    pub plausibility: Vec<Plausibility>,
     /// What to be careful about, in sentences.
     pub warnings: Vec<String>,
     /// Samples of the fit by piece.
@@ -284,6 +288,7 @@ pub(super) fn report(
         held_out,
         coefficients,
         piece_samples,
+        plausibility: plausibility(problem, &found.solution.unknowns)?,
         warnings: Vec::new(),
         information,
     };

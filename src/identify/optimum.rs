@@ -4,7 +4,7 @@ use super::source::Sources;
 use super::unknowns::{Layout, Unknowns};
 use super::{
     CalibrateOptions, ErrorModel, Fit, Info, Placed, Problem, enough_for_setups, enough_to_start, fit,
-    information, is_of_setup, place, settle,
+    information, is_of_setup, place, settle_from_afar,
 };
 use crate::error::Result;
 use crate::machine::Machine;
@@ -46,7 +46,7 @@ pub(crate) fn optimum<'a>(
     problem.loss = options.loss;
     problem.prior = options.prior;
     problem.free = vec![true; layout.len];
-    let found = settle(&problem, options.solver, placed.unknowns, noise)?;
+    let found = settle_from_afar(&mut problem, options.solver, placed.unknowns, noise)?;
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
     let information = Info::new(&found.solution.normal.matrix, &layout, problem.prior, open);
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;

@@ -156,6 +156,11 @@ impl<'a> Problem<'a> {
         pulls
     }
 
+    /// The largest total in units of its tolerance.
+    pub fn farthest(&self, unknowns: &Unknowns) -> f64 {
+        self.pulls(unknowns).amax()
+    }
+
     /// Matrix and gradient of the free parameters scaled by `scales`, prior included.
     fn scaled(
         &self,

@@ -1,12 +1,9 @@
 //! What to be careful about in a result, in sentences.
 
 use super::solve::Problem;
-use super::{Fit, Solver, Stop};
+use super::{FarOff, Fit, Solver, Stop};
 use crate::machine::Machine;
 use crate::wording::count;
-
-/// Deviations beyond so many tolerances are told.
-const CONTRADICTED: f64 = 5.0;
 
 pub(super) fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
     let (machine, sources) = (problem.machine, problem.sources);
@@ -48,19 +45,9 @@ pub(super) fn warnings(problem: &Problem, fit: &Fit) -> Vec<String> {
         warnings.push(format!("not seen by the recordings, left as declared: {open}"));
     }
     // A tolerance that the data contradict pulls at everything else.
-    let constant = fit.parameters.iter().filter(|p| p.directions.is_empty());
-    let contradicted = constant.filter(|p| p.value.abs() > CONTRADICTED * p.tolerance);
-    let mut frames: Vec<(&str, f64)> = Vec::new();
-    for p in contradicted {
-        let size = p.value.abs() / p.tolerance;
-        match frames.iter_mut().find(|(frame, _)| *frame == p.frame) {
-            Some((_, largest)) => *largest = largest.max(size),
-            None => frames.push((&p.frame, size)),
-        }
-    }
-    for (frame, size) in frames {
+    for FarOff { frame, tolerances } in fit.far_off() {
         warnings.push(format!(
-            "frame {frame} lies {size:.0} tolerances from where the machine file has it: check its declaration, or state a larger tolerance there"
+            "frame {frame} lies {tolerances:.0} tolerances from where the machine file has it: check its declaration, or state a larger tolerance there"
         ));
     }
     // Recordings of one kind share their noise, and often the figure: one sentence for all of them.

@@ -1,11 +1,12 @@
 //! The recordings of one call: where what hangs on the machine was recorded too, its columns belong beside the machine's own rows.
 
+use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use super::join::{beside, whole};
 use super::{Recording, Source};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::machine::{Machine, SideBranch};
 
 /// No more than so much of a file is looked at for the name of its machine.
@@ -28,6 +29,7 @@ pub fn open_all(paths: &[PathBuf], machine: &Machine) -> Result<Vec<Recording>> 
         paths.iter().map(|path| (path, side(path))).partition(|(_, side)| side.is_some());
     let mut recordings =
         own.iter().map(|(path, _)| Recording::open(path, machine)).collect::<Result<Vec<_>>>()?;
+    warn_of_copies(&mut recordings)?;
     for (other, side) in of_sides {
         let Some(name) = side.and_then(SideBranch::prefix) else { continue };
         let text = whole(other)?;
@@ -46,6 +48,53 @@ pub fn open_all(paths: &[PathBuf], machine: &Machine) -> Result<Vec<Recording>> 
         }
     }
     Ok(recordings)
+}
+
+/// A file that holds the bytes of another one of the call says so: its samples would count twice.
+fn warn_of_copies(recordings: &mut [Recording]) -> Result<()> {
+    let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
+    for i in 0..recordings.len() {
+        let Ok(size) = std::fs::metadata(&recordings[i].path).map(|it| it.len()) else { continue };
+        let as_long = known.entry(size).or_default();
+        let mut copy_of = None;
+        for earlier in as_long.iter() {
+            if same_bytes(&recordings[*earlier], &recordings[i])? {
+                copy_of = Some(recordings[*earlier].path.display().to_string());
+                break;
+            }
+        }
+        as_long.push(i);
+        if let Some(other) = copy_of {
+            let text = format!(
+                "it holds the same bytes as {other}: every sample counts twice; leave one of them out"
+            );
+            recordings[i].warnings.push(text);
+        }
+    }
+    Ok(())
+}
+
+/// Whether two files hold the same, read side by side.
+fn same_bytes(one: &Recording, other: &Recording) -> Result<bool> {
+    let open = |recording: &Recording| -> Result<_> {
+        Ok(BufReader::new(recording.source.read_from(&recording.path, 0)?))
+    };
+    let (mut a, mut b) = (open(one)?, open(other)?);
+    loop {
+        let (left, right) = (
+            a.fill_buf().map_err(|e| Error::file(&one.path, e))?,
+            b.fill_buf().map_err(|e| Error::file(&other.path, e))?,
+        );
+        let length = left.len().min(right.len());
+        if left[..length] != right[..length] {
+            return Ok(false);
+        }
+        if length == 0 {
+            return Ok(left.len() == right.len());
+        }
+        a.consume(length);
+        b.consume(length);
+    }
 }
 
 impl Recording {

@@ -14,6 +14,9 @@ const COUPLING_TOLERANCE: f64 = 1e-6;
 /// A command that moves by no more than this stands still, m or rad.
 const STANDSTILL: f64 = 1e-9;
 
+/// Fewer samples do not show how a clock runs.
+const STEADY: u64 = 30;
+
 /// A gap in time longer than this many median steps is a pause.
 const PAUSE_STEPS: f64 = 5.0;
 
@@ -89,9 +92,10 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
     let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.fixed.len()];
     let (mut samples, mut dropped) = (0, 0);
     let (mut time, mut steps) = (None, Steps::new());
+    let mut longest = (0.0, 0);
     let mut chunks = Pass::start(recording)?.chunks();
     for chunk in &mut chunks {
-        let Chunk { len, time: times, commands, dropped: left_out, .. } = chunk?;
+        let Chunk { len, lines, time: times, commands, dropped: left_out, .. } = chunk?;
         samples += len as u64;
         dropped += left_out;
         for row in commands.chunks_exact(ranges.len()) {
@@ -99,10 +103,13 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
                 *range = (range.0.min(*value), range.1.max(*value));
             }
         }
-        for t in times.into_iter().flatten() {
+        for (t, line) in times.into_iter().flatten().zip(lines) {
             let (first, last) = time.unwrap_or((t, t));
             if t > last {
                 steps.take(t - last);
+                if t - last > longest.0 {
+                    longest = (t - last, line);
+                }
             }
             time = Some((first, t));
         }
@@ -132,6 +139,9 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
         Some((step, pause, count)) => (Some(step), Some(pause), count),
         None => (None, None, 0),
     };
+    if pauses > 0 && samples >= STEADY {
+        warn_of_jump(longest, time, &mut warnings);
+    }
     Ok(Summary {
         rows: pass.rows,
         samples,
@@ -144,6 +154,19 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
         pauses,
         warnings,
     })
+}
+
+/// A pause longer than all the rest of the recording may be none: whatever drifts with time hangs on it alone.
+fn warn_of_jump((step, line): (f64, u64), time: Option<(f64, f64)>, warnings: &mut Vec<String>) {
+    let Some((first, last)) = time else { return };
+    let rest = last - first - step;
+    if step > rest {
+        warnings.push(format!(
+            "`t` jumps by {} s at line {line}, and runs for {} s in all the rest: a long pause, or a clock that was set",
+            brief(step),
+            brief(rest)
+        ));
+    }
 }
 
 fn warn_of_couplings(recording: &Recording, worst: &[(f64, u64)], warnings: &mut Vec<String>) {

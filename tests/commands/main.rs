@@ -15,3 +15,4 @@ mod interrupted;
 mod outputs;
 mod program;
 mod simulate;
+mod verdict;

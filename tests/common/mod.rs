@@ -4,6 +4,7 @@
 pub mod channels;
 pub mod draws;
 pub mod paper;
+pub mod planted;
 pub mod random;
 
 use std::path::{Path, PathBuf};

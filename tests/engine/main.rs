@@ -15,6 +15,7 @@ mod error_motions;
 mod instrument_noise;
 mod location;
 mod machinist;
+mod mistakes;
 mod names;
 mod paper;
 mod pieces;

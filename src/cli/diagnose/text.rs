@@ -45,6 +45,13 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
         let names = timeless.effects.join(", ");
         let _ = writeln!(text, "\nnot tried, since a recording has no column t: {names}");
     }
+    for far_off in &diagnosis.far_off {
+        let _ = writeln!(
+            text,
+            "\nnote: frame {} lies {:.0} tolerances from where the machine file has it: check its declaration, or state a larger tolerance there",
+            far_off.frame, far_off.tolerances
+        );
+    }
     text
 }
 

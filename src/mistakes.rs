@@ -1,0 +1,13 @@
+//! Recordings and machines that do not belong together, and the mistake that would explain it, `docs/reliability.md`.
+//!
+//! A mistake is a [`Change`]: data that say what to do to a recording, so that it reads as it would have without the mistake. All of them
+//! are tried on a thinned copy of the recordings with the machine as declared. One is named only if it makes them plausible, and is
+//! better than all others by far.
+
+mod change;
+mod list;
+mod search;
+mod thinned;
+
+pub use change::Change;
+pub use search::{Mistake, Nonsense, nonsense, search};

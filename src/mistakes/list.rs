@@ -1,0 +1,79 @@
+//! The mistakes that are tried.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::Change;
+use super::change::turns;
+use super::thinned::{SHIFTS, Thinned};
+use crate::machine::Machine;
+use crate::recording::Measurement;
+use crate::units::{Quantity, UNITS, Unit};
+
+/// What they are, for a message that none of them fits.
+pub(super) const TRIED: &str = "signs of joints, swapped columns, units, zeros off by 90 or 180 deg, axes of the measured frame, \
+                                sense and order of measured turns, order of rows, rows shifted by up to 3";
+
+/// Every mistake that these recordings may have.
+pub(super) fn changes(machine: &Machine, recordings: &[Thinned]) -> Vec<Change> {
+    let commands = machine.commands().len();
+    // What nobody wrote cannot be wrong; what never differs from zero has no sign.
+    let used: Vec<usize> = (0..commands)
+        .filter(|c| recordings.iter().any(|r| r.samples.iter().any(|s| s.commands[*c] != 0.0)))
+        .collect();
+    let moving: Vec<usize> = (used.iter().copied())
+        .filter(|c| {
+            let all = || recordings.iter().flat_map(|r| &r.samples).map(|s| s.commands[*c]);
+            all().fold(f64::NEG_INFINITY, f64::max) > all().fold(f64::INFINITY, f64::min)
+        })
+        .collect();
+    let unit = |c: usize| recordings.iter().find_map(|r| r.units[c]);
+    let mut all: Vec<Change> = used.iter().map(|c| Change::Sign(*c)).collect();
+    for (a, b) in pairs(&(0..commands).collect::<Vec<_>>()) {
+        if turns(machine, a) == turns(machine, b) && (moving.contains(&a) || moving.contains(&b)) {
+            all.push(Change::Swapped(a, b));
+        }
+    }
+    // All columns of a quantity in one unit, and one column alone.
+    for written in UNITS {
+        let own: Vec<usize> = used.iter().copied().filter(|c| unit(*c) == Some(written)).collect();
+        for meant in others(written) {
+            if own.len() > 1 {
+                all.push(Change::Units(own.clone(), written, meant));
+            }
+            all.extend(own.iter().map(|c| Change::Units(vec![*c], written, meant)));
+        }
+        if recordings.iter().any(|r| r.value_units.contains(&written)) {
+            all.extend(others(written).map(|meant| Change::ReadingUnits(written, meant)));
+        }
+    }
+    for c in (0..commands).filter(|c| turns(machine, *c)) {
+        all.extend([FRAC_PI_2, -FRAC_PI_2, PI].map(|by| Change::Zero(c, by)));
+    }
+    let is = |measurement: Measurement| recordings.iter().all(|r| r.measurement == measurement);
+    let (position, pose) = (is(Measurement::Position), is(Measurement::Pose));
+    if position || pose {
+        all.extend(pairs(&[0, 1, 2]).map(|(a, b)| Change::AxesSwapped(a, b)));
+        all.extend((0..3).map(Change::Mirrored));
+    } else if recordings.iter().all(|r| r.samples.iter().all(|s| s.values.len() == 1)) {
+        all.push(Change::Mirrored(0));
+    }
+    if pose {
+        all.extend([Change::Turn, Change::Inverse]);
+        all.extend([true, false].map(|scalar_last| Change::Quaternion { scalar_last }));
+    }
+    all.push(Change::Backwards);
+    let shifts = || (1..=SHIFTS as isize).flat_map(|rows| [rows, -rows]);
+    all.extend(shifts().map(Change::Rows));
+    all.extend(moving.iter().flat_map(|c| shifts().map(|rows| Change::CommandRows(*c, rows))));
+    all
+}
+
+fn pairs(of: &[usize]) -> impl Iterator<Item = (usize, usize)> + '_ {
+    of.iter().enumerate().flat_map(|(i, a)| of[i + 1..].iter().map(|b| (*a, *b)))
+}
+
+/// Units of the same quantity that people take for this one.
+fn others(written: Unit) -> impl Iterator<Item = Unit> {
+    let fits = matches!(written.quantity, Quantity::Length | Quantity::Angle);
+    UNITS.into_iter().filter(move |unit| fits && unit.quantity == written.quantity && *unit != written)
+}
