@@ -9,9 +9,7 @@ use serde::Serialize;
 
 use super::Common;
 use super::calibrate::{positive, relative};
-use super::output::{
-    Failure, Outcome, angle, check_outputs, count, length, open_machine, open_recordings, table,
-};
+use super::output::{Failure, Outcome, angle, count, length, open_machine, open_recordings, table};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -61,8 +59,6 @@ struct Comparison<'a> {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let all: Vec<PathBuf> = args.recordings.iter().chain(&args.judge).cloned().collect();
-    check_outputs(&[args.common.json_file()], &all)?;
     let tuning = Tuning { tau: args.tau, cut: args.cut, steps: args.steps as usize };
     let rivals = chosen(&args.rivals, tuning)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
@@ -103,7 +99,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     for recording in &fit_on {
         fitted_samples += recording.scan()?.samples;
     }
-    args.common.say(&render(machine.name(), fitted_samples, judged_by, truth.is_some(), &verdicts));
+    args.common.say(&render(machine.name(), fitted_samples, judged_by, truth.is_some(), &verdicts))?;
     args.common.write_json(&Comparison {
         machine: machine.name(),
         fitted_samples,

@@ -12,8 +12,7 @@ use serde_json::{Value, json};
 
 use super::Common;
 use super::output::{
-    Failure, Kind, Outcome, Shown, angle, check_outputs, count, decimals, length, open_machine,
-    open_recordings, table,
+    Failure, Kind, Outcome, Shown, angle, count, decimals, length, open_machine, open_recordings, table,
 };
 
 #[derive(clap::Args)]
@@ -32,7 +31,6 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.common.json_file()], &[])?;
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let description = describe(calibrated.machine());
     let mut text = render(&description, args.unseen);
@@ -56,7 +54,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         );
         result["recordings"] = serde_json::to_value(&reach).map_err(|e| Failure::Answer(e.to_string()))?;
     }
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&result)
 }
 
