@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
-use crate::describe::{Description, DyadDescription, describe};
+use crate::describe::{Description, DyadDescription, MOST_FRAMES, describe, describe_whole};
 use crate::identify::reach;
 use crate::lie::{Twist, Vec3};
 use crate::machine::JointKind;
@@ -32,7 +32,8 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
-    let description = describe(calibrated.machine());
+    let of = if args.unseen { describe_whole } else { describe };
+    let description = of(calibrated.machine());
     let mut text = render(&description, args.unseen);
     let mut result = serde_json::to_value(&description).map_err(|e| Failure::Answer(e.to_string()))?;
     if calibrated.samples() > 0 {
@@ -77,6 +78,11 @@ pub(crate) fn render(d: &Description, unseen: bool) -> String {
     text.push_str("\ndyads (R: revolute, P: prismatic; tolerance of translations and of rotations)\n");
     let rows: Vec<Vec<String>> = d.dyads.iter().map(row).collect();
     text.push_str(&table("  ", &[false, false, false, false, false, true, true], &rows));
+    if let Some(why) = &d.uncounted {
+        let ask = if unseen { String::new() } else { format!("; --unseen counts it up to {MOST_FRAMES}") };
+        let _ = writeln!(text, "\nnote: {why}{ask}");
+        return text;
+    }
     let _ = writeln!(
         text,
         "\nidentifiable on general poses with measured points off the axes, of {} components of deviations",

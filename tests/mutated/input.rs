@@ -399,7 +399,10 @@ impl Kind {
 /// One kind with its texts, and what they are tried on.
 pub struct Input {
     kind: Kind,
+    /// Sound ones first.
     texts: Vec<Vec<u8>>,
+    /// How many are sound: read as they are.
+    sound: usize,
     machine: Machine,
     /// The same with errors.
     actual: CalibratedMachine,
@@ -423,6 +426,9 @@ fn texts(name: &str, endings: &[&str]) -> Vec<Vec<u8>> {
         paths.iter().map(|path| std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())));
     all.filter(|text| text.len() < 1 << 15).collect()
 }
+
+/// Play in every form of its width, and deviations.
+const FAULTS: &str = "Faults(\n    units: (length: um, angle: urad),\n    deviations: [(frame: \"a\", v: (1, -2, 3), w: (0, 10, 0)), (frame: \"x\", v: (5, 0, 0))],\n    backlash: [\n        (joint: \"x\", width: 3),\n        (joint: \"y\", by_position: Points([(0, 1), (100, 4)])),\n        (joint: \"a\", by_position: Harmonics(mean: 5, cos: [2])),\n        (joint: \"c\", by_position: Polynomial([1, 0.01])),\n    ],\n)\n";
 
 const PROGRAM: &str = "G90 G21 G54\nG0 X0. Y0. Z50. A20. C10.\nT1 M6\nG43.4 H1\nG1 X10. Y-5. A22. F500\nG2 X20. I5. J0.\nC30.\nG49\nM30\n";
 
@@ -478,7 +484,11 @@ impl Input {
                     .map(|block| block.as_bytes().to_vec())
                     .collect()
             }
-            Kind::Faults => texts("tests/bad/faults", &["ron"]),
+            Kind::Faults => {
+                let mut all = texts("tests/bad/faults", &["ron"]);
+                all.push(FAULTS.into());
+                all
+            }
             Kind::Program(dialect) => {
                 let ending = match dialect {
                     Dialect::Rs274 => "nc",
@@ -489,8 +499,13 @@ impl Input {
                 folders.iter().flat_map(|folder| texts(folder, &[ending])).collect()
             }
         };
-        assert!(!texts.is_empty(), "{} has nothing to be damaged", kind.name());
-        Input { kind, texts, machine, actual, recording, facts, setup }
+        let mut input = Input { kind, texts: Vec::new(), sound: 0, machine, actual, recording, facts, setup };
+        let (sound, bad): (Vec<_>, Vec<_>) =
+            texts.into_iter().partition(|text| matches!(input.used(text, 1), Fate::Accepted));
+        assert!(!sound.is_empty(), "{} has nothing sound to be damaged", kind.name());
+        input.sound = sound.len();
+        input.texts = [sound, bad].concat();
+        input
     }
 
     pub fn name(&self) -> &'static str {
@@ -501,10 +516,11 @@ impl Input {
         self.kind.words()
     }
 
-    /// A text to be damaged, and another one to take from.
+    /// A text to be damaged, mostly a sound one, and any other to take from.
     pub fn drawn(&self, random: &mut StdRng) -> (Vec<u8>, Vec<u8>) {
-        let mut one = || self.texts[random.random_range(0..self.texts.len())].clone();
-        (one(), one())
+        let among = if random.random_range(0..4) > 0 { self.sound } else { self.texts.len() };
+        let mut one = |among: usize| self.texts[random.random_range(0..among)].clone();
+        (one(among), one(self.texts.len()))
     }
 
     /// Reads a text and does with it what the program does.
@@ -606,7 +622,7 @@ impl Input {
         setup: &Setup,
         dialect: Dialect,
     ) -> Result<Fate, Fate> {
-        let options = CompensateOptions::default().with_arcs(1e-5).with_split(1e-5).with_dialect(dialect);
+        let options = CompensateOptions::default().with_arcs(1e-5).with_dialect(dialect);
         let done = refused(compensate_text(machine, "any.nc", program, setup, &options))?;
         let Some((text, _)) = done else { return Ok(Fate::Refused) };
         let count = |text: &[u8], word: &[u8]| {
