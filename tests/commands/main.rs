@@ -13,6 +13,7 @@ mod docs_recordings;
 mod documents;
 mod files;
 mod interrupted;
+mod loads;
 mod outputs;
 mod program;
 mod simulate;

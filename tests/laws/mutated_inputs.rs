@@ -5,7 +5,7 @@ use std::time::Duration;
 use crate::mutated::drive::{Task, run};
 use crate::mutated::input::{Input, Kind};
 
-/// `cases` of each kind; many more are run by `examples/reliability.rs`.
+/// `cases` of each kind; many more are run by `examples/mutated.rs`.
 fn all_keep_their_promises(cases: u64) {
     let mut told = Vec::new();
     for kind in Kind::ALL {

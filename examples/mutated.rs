@@ -1,9 +1,9 @@
 //! Damages inputs at random and counts what becomes of them: accepted, refused with a mend, or a fault of the program.
 //!
 //! ```text
-//! cargo run --release --features measure --example reliability -- --cases 100000 --seed 1
-//! cargo run --release --features measure --example reliability -- --cases 1000000 --seed 1 --report docs/reliability.md
-//! cargo run --release --features measure --example reliability -- --only recording --from 4711 --cases 1 --seed 1 --save DIR
+//! cargo run --release --features measure --example mutated -- --cases 100000 --seed 1
+//! cargo run --release --features measure --example mutated -- --cases 1000000 --seed 1 --report docs/reliability.md
+//! cargo run --release --features measure --example mutated -- --only recording --from 4711 --cases 1 --seed 1 --save DIR
 //! ```
 
 #[path = "benchmarks/page.rs"]
@@ -84,7 +84,7 @@ fn measured(arguments: &Arguments) -> Result<bool, String> {
     println!("{text}");
     if let Some(file) = &arguments.report {
         let command = format!(
-            "cargo run --release --features measure --example reliability -- --cases {cases} --seed {seed} --report {}",
+            "cargo run --release --features measure --example mutated -- --cases {cases} --seed {seed} --report {}",
             file.display()
         );
         page::Page::new(file)
