@@ -7,6 +7,7 @@ mod compensate;
 mod demo;
 mod describe;
 mod diagnose;
+mod failure;
 mod files;
 mod join;
 mod location;
@@ -20,8 +21,9 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
+use failure::Outcome;
 use files::{Destination, Files};
-use output::{Outcome, complain, printed};
+use output::{complain, printed};
 
 /// Calibrates the geometry of any serial or bifurcated machine.
 #[derive(Parser)]

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Arg, ArgMatches, Command};
 
-use super::output::{Failure, Outcome, folder_of, not_written};
+use super::failure::{Failure, Outcome, folder_of, not_written};
 
 /// An argument that names a file to be written.
 #[derive(Clone, Debug)]
