@@ -52,7 +52,10 @@ fn once(random: &mut StdRng, text: &mut Vec<u8>, donor: &[u8], words: &[&str]) {
     let (from, to) = span(random, text);
     match random.random_range(0..13) {
         0 => drop(text.drain(from..to)),
-        1 => insert(text, from, &text[from..to].to_vec()),
+        1 => {
+            let doubled = text[from..to].to_vec();
+            insert(text, from, &doubled);
+        }
         2 => {
             let moved: Vec<u8> = text.drain(from..to).collect();
             let (at, _) = span(random, text);
