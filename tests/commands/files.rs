@@ -22,7 +22,7 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 10] = [
+const TABLE: [Row; 11] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--json"]),
@@ -30,7 +30,18 @@ const TABLE: [Row; 10] = [
     row("predict", &[], &["CALIBRATED.ron", "REC.csv", "BESIDE.csv"], &["--output", "--json"]),
     row("join", &["--as", "n"], &["REC.csv", "OTHER.csv"], &["--output", "--json"]),
     row("diagnose", &[], &["MACHINE.ron", "REC.csv", "--effects"], &["--output", "--report", "--json"]),
-    row("compensate", &[], &["CALIBRATED.ron", "PROGRAM.nc", "--setup"], &["--output", "--json"]),
+    row(
+        "compensate",
+        &[],
+        &["CALIBRATED.ron", "PROGRAM.nc", "--setup", "--m-codes"],
+        &["--output", "--json"],
+    ),
+    row(
+        "verify",
+        &[],
+        &["PROGRAM.nc", "COMPENSATED.nc", "CALIBRATED.ron", "--setup", "--m-codes"],
+        &["--json"],
+    ),
     row(
         "simulate",
         &["--test", "path"],

@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 use crate::program::{Folder, PROGRAM, command};
 
 /// Calls of every command, in this order: what earlier ones write, later ones read. `@` stands before what is a file of the folder.
-const CALLS: [&str; 10] = [
+const CALLS: [&str; 11] = [
     "simulate @m.ron --test path --input @table.csv --random 1 --noise 1um --faults @faults.ron -o @rec.csv --nc @part.nc --truth @true.ron",
     "describe @m.ron @rec.csv",
     "check @m.ron --poses 2",
@@ -18,12 +18,13 @@ const CALLS: [&str; 10] = [
     "join @rec.csv @out.csv --as n -o @joined.csv",
     "compare @m.ron @rec.csv --judge @rec.csv --truth @true.ron --rivals declared,local",
     "compensate @cal.ron @part.nc --setup @setup.ron -o @corrected.nc",
+    "verify @part.nc @corrected.nc @cal.ron --setup @setup.ron --tolerance 1mm",
     "diagnose @m.ron @rec.csv --effects @effects.ron -o @found.ron --report @page.html",
     "demo --report @demo.html",
 ];
 
 /// From here on calls take seconds.
-const SLOW: usize = 8;
+const SLOW: usize = 9;
 
 /// Ends of the names of what the calls write.
 const WRITTEN: [&str; 10] = [
