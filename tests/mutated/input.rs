@@ -490,12 +490,12 @@ impl Input {
                 all
             }
             Kind::Program(dialect) => {
-                let ending = match dialect {
-                    Dialect::Rs274 => "nc",
-                    Dialect::Siemens => "mpf",
-                    Dialect::Heidenhain => "h",
+                let (ending, own) = match dialect {
+                    Dialect::Rs274 => ("nc", "tests/nc/rs274"),
+                    Dialect::Siemens => ("mpf", "tests/nc/siemens"),
+                    Dialect::Heidenhain => ("h", "tests/nc/heidenhain"),
                 };
-                let folders = ["tests/mutated/seeds", "tests/bad/programs", "tests/nc"];
+                let folders = ["tests/mutated/seeds", "tests/bad/programs", own];
                 folders.iter().flat_map(|folder| texts(folder, &[ending])).collect()
             }
         };
@@ -622,7 +622,7 @@ impl Input {
         setup: &Setup,
         dialect: Dialect,
     ) -> Result<Fate, Fate> {
-        let options = CompensateOptions::default().with_arcs(1e-5).with_dialect(dialect);
+        let options = CompensateOptions::default().with_arcs(1e-5).with_split(1e-5).with_dialect(dialect);
         let done = refused(compensate_text(machine, "any.nc", program, setup, &options))?;
         let Some((text, _)) = done else { return Ok(Fate::Refused) };
         let count = |text: &[u8], word: &[u8]| {
