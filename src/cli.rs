@@ -7,6 +7,8 @@ mod compensate;
 mod demo;
 mod describe;
 mod diagnose;
+mod failure;
+mod files;
 mod join;
 mod location;
 mod output;
@@ -18,7 +20,11 @@ mod verify;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+use failure::Outcome;
+use files::{Destination, Files};
+use output::{complain, printed};
 
 /// Calibrates the geometry of any serial or bifurcated machine.
 #[derive(Parser)]
@@ -59,7 +65,7 @@ enum Command {
 pub(crate) struct Common {
     /// Machine-readable result, into a file or `-` for standard output
     #[arg(long, value_name = "FILE|-")]
-    json: Option<String>,
+    json: Option<Destination>,
     /// Nothing on standard output but what was asked for
     #[arg(long)]
     quiet: bool,
@@ -67,26 +73,42 @@ pub(crate) struct Common {
 
 /// Runs the command line: 0 done, 1 input at fault, 2 usage.
 pub fn run() -> ExitCode {
-    let command = Cli::parse().command;
-    part::tidy_when_interrupted();
-    let outcome = match command {
-        Command::Describe(args) => describe::run(&args),
-        Command::Check(args) => check::run(&args),
-        Command::Calibrate(args) => calibrate::run(&args),
-        Command::Compare(args) => compare::run(&args),
-        Command::Predict(args) => predict::run(&args),
-        Command::Join(args) => join::run(&args),
-        Command::Diagnose(args) => diagnose::run(&args),
-        Command::Compensate(args) => compensate::run(&args),
-        Command::Verify(args) => verify::run(&args),
-        Command::Simulate(args) => simulate::run(&args),
-        Command::Demo(args) => demo::run(&args),
+    let mut known = Cli::command();
+    let matches = known.try_get_matches_from_mut(std::env::args_os());
+    let parsed = matches.and_then(|matches| {
+        let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut known))?;
+        let named = matches.subcommand().and_then(|(name, own)| Some((known.find_subcommand(name)?, own)));
+        Ok((cli.command, named.map_or_else(Files::default, |(command, own)| Files::of(command, own))))
+    });
+    let (status, outcome) = match parsed {
+        // Help and version are such errors too, with status 0.
+        Err(error) => (error.exit_code().try_into().unwrap_or(2), printed(error.print())),
+        Ok((command, files)) => {
+            part::tidy_when_interrupted();
+            (0, files.check().and_then(|()| execute(&command, &files)))
+        }
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::from(status),
         Err(failure) => {
-            output::complain(&failure);
+            complain(&failure);
             ExitCode::from(1)
         }
+    }
+}
+
+fn execute(command: &Command, files: &Files) -> Outcome {
+    match command {
+        Command::Describe(args) => describe::run(args),
+        Command::Check(args) => check::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Predict(args) => predict::run(args),
+        Command::Join(args) => join::run(args),
+        Command::Diagnose(args) => diagnose::run(args),
+        Command::Compensate(args) => compensate::run(args),
+        Command::Verify(args) => verify::run(args),
+        Command::Simulate(args) => simulate::run(args, files),
+        Command::Demo(args) => demo::run(args),
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, SVD};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use serde::{Deserialize, Serialize};
 
 use crate::chain::Chain;
@@ -33,6 +34,9 @@ pub struct Description {
     pub parameters: usize,
     /// What each kind of measurement identifies on general poses.
     pub identifiable: Vec<Identifiable>,
+    /// Why that is not counted, where the machine has too many frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncounted: Option<String>,
 }
 
 /// One dyad.
@@ -73,8 +77,27 @@ pub struct Identifiable {
 /// Singular values below this part of the largest are rounding.
 const SEEN: f64 = 1e-9;
 
-/// Describes a machine; poses for the ranks come from a fixed seed.
+/// Most frames with which [`describe`] counts what measurements identify. The time grows with their third power; this is half a second.
+const QUICKLY: usize = 64;
+/// Most frames with which [`describe_whole`] does: some 40 s and 300 MB.
+pub const MOST_FRAMES: usize = 256;
+
+/// Describes a machine; poses for the ranks come from a fixed seed. What measurements identify is left out of a machine with more than
+/// 64 frames, and [`Description::uncounted`] says so.
 pub fn describe(machine: &Machine) -> Description {
+    described(machine, QUICKLY)
+}
+
+/// The same, with what measurements identify up to 256 frames, which takes up to a minute.
+pub fn describe_whole(machine: &Machine) -> Description {
+    described(machine, MOST_FRAMES)
+}
+
+fn described(machine: &Machine, most: usize) -> Description {
+    let frames = machine.dyads().len();
+    let uncounted = (frames > most).then(|| {
+        format!("what measurements identify is not counted with more than {most} frames (here {frames})")
+    });
     let branch = |branch: Branch| {
         let own = (0..machine.dyads().len()).filter(move |j| machine.branch(*j) == branch);
         own.map(|j| &machine.dyads()[j])
@@ -119,7 +142,8 @@ pub fn describe(machine: &Machine) -> Description {
         commands: machine.commands().to_vec(),
         dyads: (0..machine.dyads().len()).map(|j| dyad(machine, j)).collect(),
         parameters: 6 * machine.dyads().len(),
-        identifiable: identifiable(machine),
+        identifiable: if uncounted.is_none() { identifiable(machine) } else { Vec::new() },
+        uncounted,
     }
 }
 
@@ -191,7 +215,7 @@ fn identifiable(machine: &Machine) -> Vec<Identifiable> {
         ("distance, length unknown", distance, true),
         ("displacement", Sensor::Displacement { direction_w }, false),
     ]
-    .into_iter()
+    .into_par_iter()
     .map(|(name, sensor, length)| one_kind(machine, name, &sensor, length))
     .collect()
 }

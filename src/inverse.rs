@@ -171,7 +171,8 @@ struct Directions {
 
 impl Directions {
     fn of(matrix: &DMatrix<f64>) -> Directions {
-        if matrix.is_empty() {
+        // Errors beyond all numbers, as a damaged file may state them, leave no direction: the goal is out of reach.
+        if matrix.is_empty() || !matrix.iter().all(|x| x.is_finite()) {
             return Directions { parts: Vec::new() };
         }
         // Thin: as many as the smaller side has.

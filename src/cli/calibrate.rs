@@ -13,9 +13,9 @@ use crate::variation::{Directions, MOST_AXES, Varying};
 use clap::ValueEnum;
 
 use super::Common;
+use super::files::Output;
 use super::output::{
-    Failure, Kind, Outcome, angle, check_outputs, count, length, open_machine, open_recordings, table,
-    write_whole,
+    Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, table, write_whole,
 };
 use super::verdict;
 
@@ -51,7 +51,7 @@ pub(crate) struct Args {
     recordings: Vec<PathBuf>,
     /// Where to write the calibrated machine
     #[arg(short, long, value_name = "CALIBRATED.ron")]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// How to walk to the optimum
     #[arg(long, value_enum, default_value = "lm")]
     solver: SolverWord,
@@ -169,7 +169,6 @@ impl Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.output.as_deref(), args.common.json_file()], &args.recordings)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings = open_recordings(&args.recordings, &machine)?;
     let progress = args.common.progress();
@@ -187,7 +186,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         write_machine(path, &calibrated)?;
         let _ = writeln!(text, "\nwritten to {}", path.display());
     }
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&fit)
 }
 

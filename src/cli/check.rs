@@ -8,7 +8,7 @@ use crate::machine::Machine;
 use serde_json::json;
 
 use super::Common;
-use super::output::{Failure, Outcome, check_outputs, count, open_machine, table};
+use super::output::{Failure, Outcome, count, open_machine, table};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -26,7 +26,6 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.common.json_file()], &[])?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let progress = args.common.progress();
     progress.say("checking Jacobians");
@@ -56,7 +55,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     text.push_str(&table("  ", &[], &rows));
     let verdict = if passes { "all agree" } else { "there are differences" };
     let _ = writeln!(text, "worst {worst:.1e}, limit {PASS:.0e}: {verdict}");
-    args.common.say(&text);
+    args.common.say(&text)?;
     let result =
         json!({"machine": machine.name(), "limit": PASS, "worst": worst, "passes": passes, "checks": checks});
     args.common.write_json(&result)?;

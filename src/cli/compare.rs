@@ -9,9 +9,7 @@ use serde::Serialize;
 
 use super::Common;
 use super::calibrate::{positive, relative};
-use super::output::{
-    Failure, Outcome, angle, check_outputs, count, length, open_machine, open_recordings, table,
-};
+use super::output::{Failure, Outcome, angle, count, length, open_machine, open_recordings, table};
 use super::verdict;
 
 #[derive(clap::Args)]
@@ -65,8 +63,6 @@ struct Comparison<'a> {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let all: Vec<PathBuf> = args.recordings.iter().chain(&args.judge).cloned().collect();
-    check_outputs(&[args.common.json_file()], &all)?;
     let tuning = Tuning { tau: args.tau, cut: args.cut, steps: args.steps as usize };
     let rivals = chosen(&args.rivals, tuning)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
@@ -112,7 +108,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(note) = note {
         text.push_str(&format!("note: {note}\n"));
     }
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&Comparison {
         machine: machine.name(),
         fitted_samples,

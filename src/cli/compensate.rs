@@ -12,7 +12,8 @@ use crate::nc::Dialect;
 use crate::units::{Quantity, Unit};
 
 use super::Common;
-use super::output::{Failure, Outcome, angle, check_outputs, count, length, open_machine, write_whole};
+use super::files::Output;
+use super::output::{Outcome, angle, count, length, open_machine, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -24,7 +25,7 @@ pub(crate) struct Args {
     program: PathBuf,
     /// Where to write the corrected program
     #[arg(short, long, value_name = "OUT.nc")]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Tools and work offsets, docs/compensate.md
     #[arg(long, value_name = "SETUP.ron")]
     setup: Option<PathBuf>,
@@ -107,20 +108,6 @@ pub(super) fn tolerance(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let outputs = [args.output.as_deref(), args.common.json_file()];
-    check_outputs(&outputs, &[])?;
-    for output in outputs.into_iter().flatten() {
-        let same = |input: &PathBuf| match (output.canonicalize(), input.canonicalize()) {
-            (Ok(a), Ok(b)) => a == b,
-            _ => false,
-        };
-        if same(&args.program) || same(&args.machine) {
-            return Err(Failure::Told {
-                what: format!("{}: the output is one of the inputs", output.display()),
-                mend: "give the output another name; a program corrected twice is wrong".into(),
-            });
-        }
-    }
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let mut setup = args.setup.as_ref().map_or(Ok(Setup::default()), Setup::open)?;
     if let Some(codes) = &args.m_codes {
@@ -169,7 +156,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.output {
         let _ = writeln!(text, "written to {}", path.display());
     }
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&report)
 }
 

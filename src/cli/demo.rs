@@ -1,11 +1,12 @@
 //! `kincal demo`
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::demo::demo;
 
-use super::output::{Outcome, check_outputs, length};
+use super::files::Output;
+use super::output::{Outcome, length};
 use super::{Common, calibrate, diagnose};
 
 /// Where the report goes unless told otherwise.
@@ -18,14 +19,13 @@ pub(crate) struct Args {
     seed: u64,
     /// Where to write the report with its pictures: one HTML file
     #[arg(long, value_name = "OUT.html", default_value = REPORT)]
-    report: PathBuf,
+    report: Output,
     #[command(flatten)]
     common: Common,
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let report: &Path = &args.report;
-    check_outputs(&[Some(report), args.common.json_file()], &[])?;
     let progress = args.common.progress();
     let demo = demo(args.seed, &|text| progress.say(text));
     drop(progress);
@@ -49,6 +49,6 @@ pub(crate) fn run(args: &Args) -> Outcome {
     text.push_str(&diagnose::render(&demo.diagnosis));
     diagnose::write_report(report, &demo.diagnosis)?;
     let _ = writeln!(text, "\nreport with pictures written to {}", report.display());
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&demo.diagnosis)
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
-use crate::describe::{Description, DyadDescription, describe};
+use crate::describe::{Description, DyadDescription, MOST_FRAMES, describe, describe_whole};
 use crate::identify::reach;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::JointKind;
@@ -14,8 +14,7 @@ use serde_json::{Value, json};
 
 use super::Common;
 use super::output::{
-    Failure, Kind, Outcome, Shown, angle, check_outputs, count, decimals, length, open_machine,
-    open_recordings, table,
+    Failure, Kind, Outcome, Shown, angle, count, decimals, length, open_machine, open_recordings, table,
 };
 
 #[derive(clap::Args)]
@@ -37,9 +36,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.common.json_file()], &[])?;
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
-    let description = describe(calibrated.machine());
+    let of = if args.unseen { describe_whole } else { describe };
+    let description = of(calibrated.machine());
     let mut text = render(&description, args.unseen);
     let mut result = serde_json::to_value(&description).map_err(|e| Failure::Answer(e.to_string()))?;
     let poses = poses(&calibrated, &args.at)?;
@@ -65,7 +64,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         );
         result["recordings"] = serde_json::to_value(&reach).map_err(|e| Failure::Answer(e.to_string()))?;
     }
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&result)
 }
 
@@ -127,6 +126,11 @@ pub(crate) fn render(d: &Description, unseen: bool) -> String {
     text.push_str("\ndyads (R: revolute, P: prismatic; tolerance of translations and of rotations)\n");
     let rows: Vec<Vec<String>> = d.dyads.iter().map(row).collect();
     text.push_str(&table("  ", &[false, false, false, false, false, true, true], &rows));
+    if let Some(why) = &d.uncounted {
+        let ask = if unseen { String::new() } else { format!("; --unseen counts it up to {MOST_FRAMES}") };
+        let _ = writeln!(text, "\nnote: {why}{ask}");
+        return text;
+    }
     let _ = writeln!(
         text,
         "\nidentifiable on general poses with measured points off the axes, of {} components of deviations",

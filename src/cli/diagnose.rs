@@ -12,7 +12,8 @@ use crate::effects::Library;
 use crate::machine::Machine;
 
 use super::Common;
-use super::output::{Outcome, check_outputs, open_machine, open_recordings, write_whole};
+use super::files::Output;
+use super::output::{Outcome, open_machine, open_recordings, write_whole};
 use super::verdict;
 pub(crate) use text::render;
 
@@ -32,10 +33,10 @@ pub(crate) struct Args {
     without: Vec<String>,
     /// Where to write the calibrated machine with what was found
     #[arg(short, long, value_name = "CALIBRATED.ron")]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Where to write the report with its pictures: one HTML file
     #[arg(long, value_name = "OUT.html")]
-    report: Option<PathBuf>,
+    report: Option<Output>,
     /// Go on although recordings and machine do not belong together
     #[arg(long)]
     force: bool,
@@ -44,10 +45,6 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(
-        &[args.output.as_deref(), args.report.as_deref(), args.common.json_file()],
-        &args.recordings,
-    )?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings = open_recordings(&args.recordings, &machine)?;
     let mut library = Library::standard();
@@ -99,7 +96,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         write_report(path, &diagnosis)?;
         let _ = writeln!(text, "\nreport written to {}", path.display());
     }
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&diagnosis)
 }
 

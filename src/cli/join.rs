@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use crate::recording::join;
 
 use super::Common;
-use super::output::{Outcome, check_outputs, count, write_whole};
+use super::files::Output;
+use super::output::{Outcome, count, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -20,14 +21,12 @@ pub(crate) struct Args {
     name: String,
     /// Where to write the recording with both
     #[arg(short, long, value_name = "OUT.csv")]
-    output: PathBuf,
+    output: Output,
     #[command(flatten)]
     common: Common,
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let recordings = [args.recording.clone(), args.other.clone()];
-    check_outputs(&[Some(&args.output), args.common.json_file()], &recordings)?;
     let joined = join(&args.recording, &args.other, &args.name)?;
     write_whole(&args.output, |out| {
         // Watched: an error here is told of the output.
@@ -42,6 +41,6 @@ pub(crate) fn run(args: &Args) -> Outcome {
         joined.added.join(", "),
         joined.shared.join(", "),
         args.output.display()
-    ));
+    ))?;
     args.common.write_json(&joined)
 }

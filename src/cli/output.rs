@@ -4,32 +4,16 @@ use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::error::{Error, Place};
+use crate::error::Place;
 use crate::machine::Machine;
 use crate::recording::{Recording, open_all};
 use indicatif::ProgressBar;
 
 use super::Common;
+use super::failure::not_written;
+pub(crate) use super::failure::{Failure, Outcome};
+use super::files::Destination;
 use super::part::Part;
-
-/// Why a command ended with status 1.
-pub(crate) enum Failure {
-    /// The library's error.
-    Input(Error),
-    /// The command did its work, and the answer is no.
-    Answer(String),
-    /// What the command line itself found wrong, and the mend.
-    Told { what: String, mend: String },
-}
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Failure::Input(error)
-    }
-}
-
-/// Result of a command.
-pub(crate) type Outcome<T = ()> = Result<T, Failure>;
 
 /// The message, the line it is about, and the mend.
 pub(crate) fn complain(failure: &Failure) {
@@ -114,52 +98,6 @@ fn excerpt(place: &Place) -> Option<String> {
         .map(|c| if c == '\t' { '\t' } else { ' ' })
         .collect();
     Some(format!("{gap} |\n{number} | {line}\n{gap} | {before}^"))
-}
-
-/// A file that cannot be written, and why.
-fn not_written(path: &Path, source: &std::io::Error) -> Failure {
-    let folder = folder_of(path);
-    let mend = if !folder.exists() {
-        format!("create the folder {} first, or write elsewhere", folder.display())
-    } else if !folder.is_dir() {
-        format!("{} is no folder; write elsewhere", folder.display())
-    } else if path.is_dir() {
-        "name a file, not a folder".into()
-    } else {
-        "write where there is space and leave to write".into()
-    };
-    Failure::Told { what: format!("{}: cannot be written: {source}", path.display()), mend }
-}
-
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Refuses outputs that cannot be written before any work is done, and those that would overwrite a recording.
-pub(crate) fn check_outputs(outputs: &[Option<&Path>], recordings: &[PathBuf]) -> Outcome {
-    for path in outputs.iter().copied().flatten() {
-        let same = |other: &PathBuf| match (path.canonicalize(), other.canonicalize()) {
-            (Ok(a), Ok(b)) => a == b,
-            _ => false,
-        };
-        if recordings.iter().any(same) {
-            return Err(Failure::Told {
-                what: format!("{}: the output is one of the recordings", path.display()),
-                mend: "give the output another name; recordings are never overwritten".into(),
-            });
-        }
-        if path.is_dir() {
-            return Err(not_written(path, &std::io::ErrorKind::IsADirectory.into()));
-        }
-        match std::fs::metadata(folder_of(path)) {
-            Ok(folder) if !folder.is_dir() => {
-                return Err(not_written(path, &std::io::ErrorKind::NotADirectory.into()));
-            }
-            Ok(_) => {}
-            Err(source) => return Err(not_written(path, &source)),
-        }
-    }
-    Ok(())
 }
 
 /// A writer that keeps the error that it met, so that it is told of the output and not of the input.
@@ -248,23 +186,13 @@ impl Drop for Progress {
 }
 
 impl Common {
-    /// The file that the machine-readable result goes to, if it goes to one.
-    pub(crate) fn json_file(&self) -> Option<&Path> {
-        self.json.as_deref().filter(|target| *target != "-").map(Path::new)
-    }
-
     /// Writes the machine-readable result where it was asked for.
     pub(crate) fn write_json(&self, value: &impl serde::Serialize) -> Outcome {
-        if self.json.is_none() {
-            return Ok(());
-        }
+        let Some(destination) = &self.json else { return Ok(()) };
         let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Answer(e.to_string()))?;
-        match self.json_file() {
-            None => {
-                print(&format!("{text}\n"));
-                Ok(())
-            }
-            Some(path) => write_whole(path, |out| {
+        match destination {
+            Destination::StandardOutput => print(&format!("{text}\n")),
+            Destination::File(path) => write_whole(path, |out| {
                 // Watched: an error here is told of the output.
                 let _ = writeln!(out, "{text}");
                 Ok(())
@@ -273,9 +201,11 @@ impl Common {
     }
 
     /// Prints for people, unless standard output belongs to JSON or nobody wants to read.
-    pub(crate) fn say(&self, text: &str) {
-        if !self.quiet && self.json.as_deref() != Some("-") {
-            print(text);
+    pub(crate) fn say(&self, text: &str) -> Outcome {
+        match self.json {
+            Some(Destination::StandardOutput) => Ok(()),
+            _ if self.quiet => Ok(()),
+            _ => print(text),
         }
     }
 
@@ -290,9 +220,22 @@ impl Common {
     }
 }
 
-/// To standard output; a closed pipe is not our trouble.
-pub(crate) fn print(text: &str) {
-    let _ = std::io::stdout().lock().write_all(text.as_bytes());
+/// To standard output, all of it. A reader that has seen enough (`| head`) is no fault.
+pub(crate) fn print(text: &str) -> Outcome {
+    let mut out = std::io::stdout().lock();
+    printed(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// What became of something that was sent to standard output.
+pub(super) fn printed(result: std::io::Result<()>) -> Outcome {
+    match result {
+        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Told {
+            what: format!("standard output cannot be written: {source}"),
+            mend: "send it where there is space; files that options name are written whole or not at all"
+                .into(),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// `1 recording`, `2 recordings`.

@@ -7,9 +7,8 @@ use crate::identify::{Loss, fit_setup};
 use crate::predict::{Prediction, predict};
 
 use super::Common;
-use super::output::{
-    Failure, Kind, Outcome, check_outputs, count, open_machine, open_recordings, write_whole,
-};
+use super::files::Output;
+use super::output::{Failure, Kind, Outcome, count, open_machine, open_recordings, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -24,7 +23,7 @@ pub(crate) struct Args {
     beside: Vec<PathBuf>,
     /// Where to write the recording with model and residual columns
     #[arg(short, long, value_name = "OUT.csv")]
-    output: Option<PathBuf>,
+    output: Option<Output>,
     /// Find again what belongs to the set-up (frame w, tool point, zero, length, effects of where it stands); the machine stays as it is
     #[arg(long)]
     fit_setup: bool,
@@ -34,7 +33,6 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let files: Vec<PathBuf> = std::iter::once(&args.recording).chain(&args.beside).cloned().collect();
-    check_outputs(&[args.output.as_deref(), args.common.json_file()], &files)?;
     let mut calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let recordings = open_recordings(&files, calibrated.machine())?;
     if recordings.len() > 1 {
@@ -71,7 +69,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(path) = &args.output {
         text.push_str(&format!("written to {}\n", path.display()));
     }
-    args.common.say(&text);
+    args.common.say(&text)?;
     args.common.write_json(&prediction)
 }
 

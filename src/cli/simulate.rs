@@ -12,26 +12,19 @@ use crate::machine::JointKind;
 use crate::simulate::{Session, Style, Written};
 use serde_json::json;
 
-use super::output::{Kind, Outcome, check_outputs, count, length, open_machine, table, write_whole};
+use super::files::Files;
+use super::output::{Kind, Outcome, count, length, open_machine, table, write_whole};
 pub(crate) use args::Args;
 use args::DropAs;
 use build::{Built, build, usage};
 
-pub(crate) fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args, named: &Files) -> Outcome {
     if let Some(option) = args.useless() {
         return Err(usage(
             format!("`{option}` means nothing to the test `{}`", args.test.word()),
             "leave it out, or run another test; --help says which test an option belongs to",
         ));
     }
-    let outputs =
-        [Some(args.output.as_path()), args.nc.as_deref(), args.truth.as_deref(), args.common.json_file()];
-    let inputs: Vec<PathBuf> = [Some(&args.machine), args.input.as_ref(), args.faults.as_ref()]
-        .into_iter()
-        .flatten()
-        .cloned()
-        .collect();
-    check_outputs(&outputs, &[])?;
     let machine = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let progress = args.common.progress();
     progress.say("solving the path");
@@ -43,7 +36,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         drop_out: if args.drop_out_as == DropAs::Nan { "NaN" } else { "" },
     };
     let files = names(&args.output, runs.len());
-    check_apart(&outputs, &files, &inputs)?;
+    named.with_outputs("--output", &files).check()?;
     let mut session = Session::new(&plant, &runs, &style, args.pause, args.seed)?.beginning_at(args.begin);
     let mut all: Vec<Written> = Vec::new();
     for file in &files {
@@ -73,29 +66,8 @@ pub(crate) fn run(args: &Args) -> Outcome {
         })?;
     }
     drop(progress);
-    args.common.say(&summary(args, machine.machine(), &plant, &files, &all, &lengths));
+    args.common.say(&summary(args, machine.machine(), &plant, &files, &all, &lengths))?;
     args.common.write_json(&result(args, machine.machine(), &plant, &files, &all, &lengths))
-}
-
-/// Refuses outputs that would overwrite an input or each other.
-fn check_apart(outputs: &[Option<&Path>], files: &[PathBuf], inputs: &[PathBuf]) -> Outcome {
-    // The first output stands for the recordings.
-    let all: Vec<&Path> =
-        outputs[1..].iter().flatten().copied().chain(files.iter().map(PathBuf::as_path)).collect();
-    for (i, output) in all.iter().enumerate() {
-        let same = |input: &&PathBuf| matches!((output.canonicalize(), input.canonicalize()), (Ok(a), Ok(b)) if a == b);
-        if let Some(input) = inputs.iter().find(same) {
-            let what = format!("{}: would be overwritten, and it is an input", input.display());
-            return Err(usage(what, "give the output another name"));
-        }
-        if all[..i].contains(output) {
-            return Err(usage(
-                format!("{}: two outputs have this name", output.display()),
-                "give each its own",
-            ));
-        }
-    }
-    Ok(())
 }
 
 /// `REC.csv`, or `REC_1.csv`, `REC_2.csv` ...
@@ -103,9 +75,16 @@ fn names(output: &Path, runs: usize) -> Vec<PathBuf> {
     if runs == 1 {
         return vec![output.to_path_buf()];
     }
-    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
-    let extension = output.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
-    (1..=runs).map(|i| output.with_file_name(format!("{stem}_{i}{extension}"))).collect()
+    let numbered = |i: usize| {
+        let mut name = output.file_stem().unwrap_or_default().to_os_string();
+        name.push(format!("_{i}"));
+        if let Some(extension) = output.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        output.with_file_name(name)
+    };
+    (1..=runs).map(numbered).collect()
 }
 
 fn summary(

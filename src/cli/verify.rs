@@ -8,7 +8,7 @@ use crate::compensate::{Departure, Setup, Verification, VerifyOptions, verify};
 
 use super::Common;
 use super::compensate::{DialectWord, at, dialect_of, tolerance};
-use super::output::{Failure, Outcome, angle, check_outputs, count, length, open_machine};
+use super::output::{Failure, Outcome, angle, count, length, open_machine};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -44,7 +44,6 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    check_outputs(&[args.common.json_file()], &[])?;
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let mut setup = args.setup.as_ref().map_or(Ok(Setup::default()), Setup::open)?;
     if let Some(codes) = &args.m_codes {
@@ -60,7 +59,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     progress.say(&format!("reading {}", args.compensated.display()));
     let found = verify(&calibrated, &args.program, &args.compensated, &setup, &options)?;
     drop(progress);
-    args.common.say(&render(&found));
+    args.common.say(&render(&found))?;
     args.common.write_json(&found)?;
     if found.holds() {
         return Ok(());

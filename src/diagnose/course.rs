@@ -2,7 +2,7 @@
 //! `docs/diagnosis-method.md` (69).
 
 use super::curves::{column, product};
-use super::discrepancy::{EARLY, UNKNOWN};
+use super::discrepancy::{EARLY, UNKNOWN, longest};
 use super::series::{Motion, Series, over_range, series, smooth, unit};
 use crate::effects::Place;
 use crate::feature::{JointSamples, Samples};
@@ -98,10 +98,15 @@ impl<'a> Course<'a> {
         curve
     }
 
-    /// What is left, until the joint first turns round in a recording, of what was there before.
+    /// What is left, until the joint first turns round in a recording, of what was there before: in those recordings where that lasts longest.
     fn before(&self) -> Vec<Vec<f64>> {
+        let early = |recording: &Samples| -> usize {
+            let since = recording.joints[self.joint].as_ref().map(|columns| &columns.since_reversal);
+            since.map_or(0, |since| since.iter().take_while(|since| **since >= UNKNOWN).count())
+        };
         let mut curves = Vec::new();
-        for (at, recording) in self.samples.iter().enumerate() {
+        for at in longest(&self.samples.iter().map(early).collect::<Vec<usize>>()) {
+            let recording = &self.samples[at];
             let Some(columns) = &recording.joints[self.joint] else { continue };
             if columns.since_reversal.first().is_none_or(|since| *since < UNKNOWN) {
                 continue;

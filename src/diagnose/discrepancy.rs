@@ -28,6 +28,9 @@ const WANDER: usize = 3;
 const DECAYS: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 /// The same for what is remembered of the time before a recording.
 pub(super) const EARLY: [f64; 3] = [0.003, 0.01, 0.03];
+/// Most recordings whose beginnings have unknowns of their own. Each of them is a column as long as all samples: with thousands of recordings
+/// these would fill the memory, and say little beside those that last longest.
+const BEGINNINGS: usize = 64;
 /// Effects with more directions keep the mixture of them that was found.
 pub(super) const MOST_DIRECTIONS: usize = 3;
 
@@ -53,9 +56,17 @@ pub(super) fn initial_conditions(
         let travelled = column(stretches, j, |c| &c.travelled);
         let range = extent(&column(stretches, j, |c| &c.position));
         let mut first = 0;
-        for stretch in stretches {
+        let early = |s: &Samples| {
+            let own = s.joints[j].iter().flat_map(|of| &of.since_reversal);
+            own.filter(|since| lasts || **since >= UNKNOWN).count()
+        };
+        let taken = longest(&stretches.iter().map(early).collect::<Vec<usize>>());
+        for (at, stretch) in stretches.iter().enumerate() {
             let own = first..first + stretch.len;
             first = own.end;
+            if taken.binary_search(&at).is_err() {
+                continue;
+            }
             let before = |part: f64| -> Vec<f64> {
                 // What is taken up gradually does not end where the joint turns round.
                 let unknown = |k: &usize| own.contains(k) && (lasts || since[*k] >= UNKNOWN);
@@ -75,17 +86,34 @@ pub(super) fn initial_conditions(
         let parameters = &in_model.score.parameters;
         let (with, without) = (feature.over(&turned, parameters), feature.over(stretches, parameters));
         let change: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
-        let mut first = 0;
+        let (mut first, mut lengths) = (0, Vec::new());
         for stretch in stretches {
             let own = first..first + stretch.len;
             first = own.end;
-            if change[own.clone()].iter().any(|x| x.abs() > 0.0) {
+            lengths.push(change[own].iter().filter(|x| x.abs() > 0.0).count());
+        }
+        let taken = longest(&lengths);
+        first = 0;
+        for (at, stretch) in stretches.iter().enumerate() {
+            let own = first..first + stretch.len;
+            first = own.end;
+            if taken.binary_search(&at).is_ok() && change[own.clone()].iter().any(|x| x.abs() > 0.0) {
                 let only = |k: usize| if own.contains(&k) { change[k] } else { 0.0 };
                 curves.push((0..change.len()).map(only).collect());
             }
         }
     }
     whitened(rows, answers, curves, amplitude(in_model))
+}
+
+/// The recordings whose beginnings last longest, in their order: all of them where there are not too many.
+pub(super) fn longest(lengths: &[usize]) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..lengths.len()).collect();
+    // Stable: of equals the first ones.
+    all.sort_by_key(|i| std::cmp::Reverse(lengths[*i]));
+    all.truncate(BEGINNINGS);
+    all.sort_unstable();
+    all
 }
 
 /// Norm of what an effect does to the whitened rows.

@@ -432,7 +432,7 @@ fn a_recording_is_never_overwritten() {
     let (folder, rec, ron) = calibrated("overwrite");
     let before = folder.read("rec.csv");
     let message = fails(1, &["predict", &ron, &rec, "-o", &rec]);
-    assert!(message.contains("the output is one of the recordings"), "{message}");
+    assert!(message.contains("would overwrite REC.csv"), "{message}");
     fails(1, &["calibrate", MACHINE, &rec, "-o", &rec]);
     fails(1, &["calibrate", MACHINE, &rec, "--json", &rec]);
     assert_eq!(folder.read("rec.csv"), before);

@@ -45,7 +45,7 @@ fn the_command_prints_a_table_and_says_what_is_wrong_with_its_input() {
         (vec!["--samples", "1"], 2, "--samples"),
         (vec!["--tau", "-1"], 2, "above zero"),
         (vec!["--judge", "nowhere.csv"], 1, "nothing is there"),
-        (vec!["--json", rec.as_str()], 1, "the output is one of the recordings"),
+        (vec!["--json", rec.as_str()], 1, "would overwrite REC.csv"),
     ] {
         let all: Vec<&str> = ["compare", ron, &rec].into_iter().chain(args.iter().copied()).collect();
         let (got, out, err) = said(&all);

@@ -48,6 +48,21 @@ fn correct(machine: &Machine, chain: &Chain<f64>, q: &[f64]) -> Solution {
 }
 
 #[test]
+fn errors_beyond_all_numbers_leave_the_goal_out_of_reach() {
+    let machine = machine("ac_table_tilting");
+    let q = &random_commands(&machine, 1, 11)[0];
+    for turns in [false, true] {
+        let mut deviations = random_deviations(&machine, 1.0, 4);
+        let number = if turns { &mut deviations[0].w.0[0] } else { &mut deviations[0].v.0[0] };
+        *number = f64::INFINITY;
+        let chain = CalibratedMachine::nominal(machine.clone()).with_deviations(deviations).chain();
+        let solution = correct(&machine, &chain, q);
+        assert_eq!(solution.outcome, Outcome::Unreachable);
+        assert_eq!(&solution.commands, q);
+    }
+}
+
+#[test]
 fn every_five_axis_machine_corrects_its_errors_in_three_steps() {
     let found = five_axis();
     assert!(found.len() >= 7, "{}", found.len());

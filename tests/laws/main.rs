@@ -3,6 +3,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../mutated/mod.rs"]
+mod mutated;
 
 mod arrays;
 mod bad_effects;
@@ -18,6 +20,7 @@ mod jacobians;
 mod join;
 mod lie;
 mod machines;
+mod mutated_inputs;
 mod nc;
 mod recordings;
 mod rooms;

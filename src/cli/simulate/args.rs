@@ -9,6 +9,7 @@ use clap::ValueEnum;
 
 use super::amounts::{self as amounts, Held, Rate};
 use crate::cli::Common;
+use crate::cli::files::Output;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -240,13 +241,13 @@ path         commands from a table (--input COMMANDS.csv)"
 
     /// Recording; several of one call are numbered, REC_1.csv, REC_2.csv
     #[arg(short, long, value_name = "REC.csv", help_heading = "Output")]
-    pub output: PathBuf,
+    pub output: Output,
     /// The commands as an NC program as well
     #[arg(long, value_name = "OUT.nc", help_heading = "Output")]
-    pub nc: Option<PathBuf>,
+    pub nc: Option<Output>,
     /// The machine with its constant deviations as a calibrated file as well
     #[arg(long, value_name = "TRUTH.ron", help_heading = "Output")]
-    pub truth: Option<PathBuf>,
+    pub truth: Option<Output>,
     /// Units of commands
     #[arg(long, default_value = "mm,deg", value_parser = amounts::units, value_name = "LENGTH,ANGLE", help_heading = "Output")]
     pub units: FileUnits,
