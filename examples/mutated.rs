@@ -68,7 +68,7 @@ fn measured(arguments: &Arguments) -> Result<bool, String> {
     let mut tallies = Vec::new();
     let wanted = |kind: &Kind| arguments.only.as_ref().is_none_or(|only| kind.name().contains(only.as_str()));
     for kind in Kind::ALL.into_iter().filter(wanted) {
-        let (tally, findings) = run(Input::new(kind), task);
+        let (tally, findings) = run(Input::new(kind).subdividing(), task);
         for finding in &findings {
             eprintln!("{} {} of seed {seed}: {}", finding.input, finding.number, finding.says);
             if let Some(folder) = &arguments.save {

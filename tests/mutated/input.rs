@@ -409,6 +409,8 @@ pub struct Input {
     recording: Recording,
     facts: RecordingFacts,
     setup: Setup,
+    /// Subdivides straight moves, m. A coordinate of millions of metres makes that last for seconds.
+    split: Option<f64>,
 }
 
 fn folder(name: &str) -> PathBuf {
@@ -499,13 +501,28 @@ impl Input {
                 folders.iter().flat_map(|folder| texts(folder, &[ending])).collect()
             }
         };
-        let mut input = Input { kind, texts: Vec::new(), sound: 0, machine, actual, recording, facts, setup };
+        let mut input = Input {
+            kind,
+            texts: Vec::new(),
+            sound: 0,
+            machine,
+            actual,
+            recording,
+            facts,
+            setup,
+            split: None,
+        };
         let (sound, bad): (Vec<_>, Vec<_>) =
             texts.into_iter().partition(|text| matches!(input.used(text, 1), Fate::Accepted));
         assert!(!sound.is_empty(), "{} has nothing sound to be damaged", kind.name());
         input.sound = sound.len();
         input.texts = [sound, bad].concat();
         input
+    }
+
+    /// With straight moves of programs subdivided where their middle would be off by more than 10 um.
+    pub fn subdividing(self) -> Input {
+        Input { split: Some(1e-5), ..self }
     }
 
     pub fn name(&self) -> &'static str {
@@ -622,7 +639,8 @@ impl Input {
         setup: &Setup,
         dialect: Dialect,
     ) -> Result<Fate, Fate> {
-        let options = CompensateOptions::default().with_arcs(1e-5).with_split(1e-5).with_dialect(dialect);
+        let mut options = CompensateOptions::default().with_arcs(1e-5).with_dialect(dialect);
+        options.split = self.split;
         let done = refused(compensate_text(machine, "any.nc", program, setup, &options))?;
         let Some((text, _)) = done else { return Ok(Fate::Refused) };
         let count = |text: &[u8], word: &[u8]| {
