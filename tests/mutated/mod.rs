@@ -7,3 +7,4 @@ pub mod input;
 pub mod mutation;
 pub mod table;
 pub mod tally;
+pub mod words;
