@@ -41,12 +41,13 @@ pub(super) fn write(
         let at = |s: f64| -> Vec<f64> {
             meant.program().iter().zip(end.program()).map(|(a, b)| a + (b - a) * s).collect()
         };
+        // What leads out of travel is refused before it is subdivided.
+        let there = pass.correct(block, end.q(), None)?;
         let mut count = 1;
         while count < MOST_PARTS && unsplit(pass, &at, count) > tolerance {
             count *= 2;
         }
         if count > 1 {
-            let there = pass.correct(block, end.q(), None)?;
             let ways = [Way { from: &meant, to: &end }, Way { from: &written, to: there.written() }];
             if feed::is_upset(pass.program(), motion, &ways[0], &ways[1]) {
                 return refuse(block, 0, CompensateFault::RotaryFeed);
