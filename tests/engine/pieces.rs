@@ -102,7 +102,7 @@ fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
                 along(&machine, dh, joint, 2e-5 * f64::from(directions[*c]))
             })
         };
-        let recordings = open(&machine, &record(&machine, &path(&machine, 200), &wrong));
+        let recordings = open(&machine, &record(&machine, &path(&machine, 120), &wrong));
         let varying = Varying { directions: Some(Directions::new(axes.clone())), terms: Vec::new() };
         // Dead bands of nothing: the path is exact.
         let model = ErrorModel::default()
@@ -205,7 +205,7 @@ fn coefficients_of_terms_before_and_behind_the_joint_and_on_the_reading_are_reco
         let behind = Twist::from_array([0.0, 0.0, 0.0, 0.6, 0.0, 0.8]);
         let (lost, tilt, drift) = (4.1e-5, 3.3e-5, 2.7e-6);
         let constant = random_deviations(&machine, 0.3, 6);
-        let commands = path(&machine, 600);
+        let commands = path(&machine, 300);
         let square = |q: &[f64]| q[axes[0]] * q[axes[0]];
         // The carried deviation is simulated as one of the next frame: exp(e) M = M exp(Ad(M⁻¹) e).
         let next =
