@@ -59,10 +59,11 @@ impl Known<'_> {
                 Kind::Word(index) => self.word(block, index),
                 Kind::Call => {
                     let name = block.name(token);
-                    // What else is called is told as a call.
-                    (self.vocabulary.has_call(&name) || structures(&name) || self.dialect == Dialect::Siemens)
-                        .then_some(())
-                        .map_or(Some(Unknown::Name), |()| None)
+                    // What a Siemens program calls besides is told as a call.
+                    let known = self.dialect == Dialect::Siemens
+                        || self.vocabulary.has_call(&name)
+                        || structures(&name);
+                    (!known).then_some(Unknown::Name)
                 }
                 Kind::Name => {
                     let name = block.name(token);
