@@ -2,6 +2,7 @@
 //!
 //! A calibrated file is a machine file with one more field, `calibration`; whatever reads a machine reads it too.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -256,6 +257,22 @@ impl CalibratedMachine {
                 *q < from - slack || *q > to + slack
             })
         })
+    }
+
+    /// The commands nearest to these that the calibration has seen, m or rad; those of turning joints may be whole turns away.
+    pub fn nearest_seen(&self, commands: &[f64]) -> Vec<f64> {
+        let nearest = |c: usize| {
+            let q = commands[c];
+            let Some((from, to)) = self.seen[c] else { return q };
+            let turns = match self.machine.command_joint(c).kind {
+                JointKind::Revolute if q < from => ((from - q) / TAU).ceil(),
+                JointKind::Revolute if q > to => ((to - q) / TAU).floor(),
+                _ => 0.0,
+            };
+            let turned = q + turns * TAU;
+            if (from..=to).contains(&turned) { turned } else { q.clamp(from, to) }
+        };
+        (0..commands.len()).map(nearest).collect()
     }
 
     /// Reads a machine file, calibrated or not.

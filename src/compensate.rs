@@ -32,6 +32,7 @@
 
 // What is asked for and told.
 mod fault;
+mod mark;
 mod options;
 mod report;
 mod setup;
@@ -94,6 +95,8 @@ mod curve;
 // What goes over a whole program.
 mod subprograms;
 
+mod passage;
+
 mod gaps;
 mod scout;
 mod trace;
@@ -107,13 +110,14 @@ use std::path::Path;
 
 pub use fault::CompensateFault;
 pub use model::Model;
-pub use options::{CompensateOptions, UnknownAxes};
+pub use options::{CompensateOptions, IntegerUnit, UnknownAxes};
 pub use report::{
-    Listed, MOST_LISTED, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, Unseen,
-    UnseenPattern, UnseenPiece, Worst,
+    Beyond, Listed, MOST_LISTED, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached,
+    Unseen, UnseenPattern, UnseenPiece, Worst,
 };
 pub use setup::{Setup, ToolAxis};
-pub use verify::{Departure, Verification, VerifyOptions, verify};
+pub(crate) use verify::verify_written;
+pub use verify::{Departure, Verification, VerifyOptions, verify, verify_text};
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
@@ -123,9 +127,10 @@ use crate::nc::{Program, State};
 use calibrated::model_of;
 use gaps::{Gaps, is_gap};
 use interpreter::Interpreter;
+use mark::{Mark, Origin};
 use output::put;
+use passage::{Passage, Survey, read_as};
 use scout::Scout;
-use subprograms::{follow, sub_programs};
 use writer::Writer;
 
 /// Corrects the program `path` and writes it to `out`. Memory does not grow with the program, sub-programs
@@ -147,7 +152,7 @@ pub fn compensate(
         Program::new(path, BufReader::new(file))
     };
     let mut model = model_of(calibrated);
-    run(calibrated.machine(), &mut *model, &open, setup, options, out)
+    run(calibrated.machine(), &mut *model, Some(Origin::of(calibrated)), &open, setup, options, out)
 }
 
 /// As [`compensate`], from a text to a text; `file` is only the name that messages use.
@@ -162,12 +167,13 @@ pub fn compensate_text(
     options: &CompensateOptions,
 ) -> Result<(String, Report)> {
     let mut model = model_of(calibrated);
-    let machine = calibrated.machine();
-    let (bytes, report) = compensate_with(machine, &mut *model, file, text.as_ref(), setup, options)?;
+    let (machine, origin) = (calibrated.machine(), Some(Origin::of(calibrated)));
+    let (bytes, report) =
+        run_on_text(machine, &mut *model, origin, file.as_ref(), text.as_ref(), setup, options)?;
     Ok((String::from_utf8_lossy(&bytes).into_owned(), report))
 }
 
-/// As [`compensate_text`], for any model of a machine's errors.
+/// As [`compensate_text`], for any model of a machine's errors; what is written bears no mark.
 ///
 /// # Errors
 /// As [`compensate`].
@@ -179,9 +185,21 @@ pub fn compensate_with(
     setup: &Setup,
     options: &CompensateOptions,
 ) -> Result<(Vec<u8>, Report)> {
+    run_on_text(machine, model, None, file.as_ref(), text, setup, options)
+}
+
+fn run_on_text(
+    machine: &Machine,
+    model: &mut dyn Model,
+    origin: Option<Origin>,
+    file: &Path,
+    text: &[u8],
+    setup: &Setup,
+    options: &CompensateOptions,
+) -> Result<(Vec<u8>, Report)> {
     let mut out = Vec::with_capacity(text.len() + text.len() / 4);
-    let open = || Program::new(file.as_ref(), text);
-    let report = run(machine, model, &open, setup, options, &mut out)?;
+    let open = || Program::new(file, text);
+    let report = run(machine, model, origin, &open, setup, options, &mut out)?;
     Ok((out, report))
 }
 
@@ -190,6 +208,7 @@ pub fn compensate_with(
 fn run<R: BufRead>(
     machine: &Machine,
     model: &mut dyn Model,
+    origin: Option<Origin>,
     open: &dyn Fn() -> Result<Program<R>>,
     setup: &Setup,
     options: &CompensateOptions,
@@ -197,15 +216,13 @@ fn run<R: BufRead>(
 ) -> Result<Report> {
     let open = || {
         let mut program = open()?;
-        if let Some(dialect) = options.dialect {
-            program.set_dialect(dialect);
-        }
+        read_as(&mut program, options.dialect, options.integer_unit);
         Ok::<_, Error>(program)
     };
     if model.is_nominal() {
         return copy(machine, &mut open()?, out);
     }
-    match correct(machine, model, &open, setup, options, out) {
+    match correct(machine, model, origin, &open, setup, options, out) {
         Err(error) if error.fault().is_some_and(is_gap) => {
             let all = gaps(machine, &open, setup)?.together();
             Err(match (error.place(), all) {
@@ -221,32 +238,60 @@ fn run<R: BufRead>(
 fn correct<R: BufRead>(
     machine: &Machine,
     model: &mut dyn Model,
+    origin: Option<Origin>,
     open: &dyn Fn() -> Result<Program<R>>,
     setup: &Setup,
     options: &CompensateOptions,
     out: &mut dyn Write,
 ) -> Result<Report> {
-    let mut program = open()?;
+    let program = open()?;
     let dialect = program.dialect();
-    let mut calls = sub_programs(&mut program)?;
+    let Survey { mut calls, fingerprint, foot, without_point, .. } = {
+        let survey = Survey::of(program)?;
+        if !options.force {
+            survey.refuse_marked(origin)?;
+        }
+        survey
+    };
     let start = Interpreter::new(machine, setup, dialect);
     let mut first = vec![0; machine.commands().len()];
     if !model.keyed().is_empty() {
         let mut scout = Scout::new(start.clone(), model);
+        let mut passage = Passage::new(open()?, &mut calls);
         // What is wrong with the program is told when it is corrected.
-        let _ = follow(&mut scout, &mut open()?, &mut calls, &mut std::io::sink(), Scout::has_found);
+        while !scout.has_found() && passage.step(&mut scout, &mut std::io::sink()).unwrap_or(false) {}
         first = scout.finish();
     }
     if !calls.is_empty() {
         calls.collect(true);
         let mut writer = Writer::new(start.clone(), model, options, &first);
-        follow(&mut writer, &mut open()?, &mut calls, &mut std::io::sink(), |_| false)?;
+        Passage::new(open()?, &mut calls).finish(&mut writer)?;
         calls.collect(false);
     }
     let mut writer = Writer::new(start, model, options, &first);
-    let blocks = follow(&mut writer, &mut open()?, &mut calls, out, |_| false)?;
+    let mut passage = Passage::new(open()?, &mut calls);
+    let mark = origin.filter(|_| options.marked).map(|origin| Mark { program: fingerprint, origin });
+    let sign = |writer: &mut Writer, out: &mut dyn Write| match mark.filter(|_| writer.has_corrected()) {
+        Some(mark) => foot.write(&mark, dialect, out).map_err(|e| Error::file("output", e)),
+        None => Ok(()),
+    };
+    loop {
+        if foot.is_before(passage.passed() + 1) {
+            sign(&mut writer, out)?;
+        }
+        if !passage.step(&mut writer, out)? {
+            break;
+        }
+    }
+    if foot.is_last() {
+        sign(&mut writer, out)?;
+    }
+    let blocks = passage.passed() as u64;
     let mut report = writer.finish();
     report.blocks = blocks;
+    if dialect == Dialect::Rs274 && options.integer_unit.is_none() {
+        report.numbers_without_point = without_point;
+    }
     Ok(report)
 }
 
@@ -256,10 +301,10 @@ fn gaps<'a, R: BufRead>(
     open: &dyn Fn() -> Result<Program<R>>,
     setup: &'a Setup,
 ) -> Result<Gaps<'a>> {
-    let mut program = open()?;
+    let program = open()?;
     let mut gaps = Gaps::new(Interpreter::new(machine, setup, program.dialect()));
-    let mut calls = sub_programs(&mut program)?;
-    follow(&mut gaps, &mut open()?, &mut calls, &mut std::io::sink(), |_| false)?;
+    let mut calls = Survey::of(program)?.calls;
+    Passage::new(open()?, &mut calls).finish(&mut gaps)?;
     Ok(gaps)
 }
 

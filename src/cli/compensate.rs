@@ -1,11 +1,12 @@
 //! `kincal compensate`
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::calibration::CalibratedMachine;
 use crate::compensate::{
-    CompensateOptions, Listed, Report, Setup, UnknownAxes, UnknownWay, Worst, compensate,
+    Beyond, CompensateOptions, IntegerUnit, Listed, Report, Setup, UnknownAxes, UnknownWay, Verification,
+    VerifyOptions, Worst, compensate, verify_written,
 };
 use crate::inverse::Mode;
 use crate::nc::Dialect;
@@ -13,7 +14,8 @@ use crate::units::{Quantity, Unit};
 
 use super::Common;
 use super::files::Output;
-use super::output::{Outcome, angle, count, length, open_machine, write_whole};
+use super::output::{Failure, Outcome, angle, count, length, open_machine, write_checked};
+use super::verify::departures;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -50,9 +52,21 @@ pub(crate) struct Args {
     /// Moves that need the word of an axis of which it is not known where it stands: without this, rapids are kept
     #[arg(long, value_enum)]
     unknown: Option<UnknownWord>,
+    /// Tell steps of the correction apart that are larger than this where a direction of travel changes
+    #[arg(long, value_name = "LENGTH", value_parser = tolerance)]
+    max_step: Option<f64>,
     /// The control, where the program's first lines do not say it
     #[arg(long, value_enum)]
     dialect: Option<DialectWord>,
+    /// What axis numbers without a point count in RS-274 programs: without this, mm and deg
+    #[arg(long, value_enum)]
+    integer_unit: Option<IntegerWord>,
+    /// Do not read what was written anew to see whether it does what it should
+    #[arg(long)]
+    no_verify: bool,
+    /// Compensate a program that is compensated already, or that goes where the model says nothing
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     common: Common,
 }
@@ -81,6 +95,22 @@ pub(super) enum DialectWord {
     Rs274,
     Siemens,
     Heidenhain,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+pub(super) enum IntegerWord {
+    /// Millimetres and degrees
+    Mm,
+    /// Thousandths of them, the least increments of the control
+    Um,
+}
+
+/// The unit of a word.
+pub(super) fn integer_unit_of(word: IntegerWord) -> IntegerUnit {
+    match word {
+        IntegerWord::Mm => IntegerUnit::Mm,
+        IntegerWord::Um => IntegerUnit::Um,
+    }
 }
 
 /// The dialect of a word.
@@ -118,6 +148,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
         arcs: args.arcs,
         split: args.split,
         max_correction: args.max_correction,
+        max_step: args.max_step,
+        integer_unit: args.integer_unit.map(integer_unit_of),
+        marked: true,
+        force: args.force,
         mode: args.mode.map(|mode| match mode {
             ModeWord::Position => Mode::Position,
             ModeWord::Axis => Mode::PositionAndAxis,
@@ -131,20 +165,30 @@ pub(crate) fn run(args: &Args) -> Outcome {
     };
     let progress = args.common.progress();
     progress.say(&format!("correcting {}", args.program.display()));
-    let mut report = None;
-    match &args.output {
-        None => {
-            let mut nowhere = std::io::sink();
-            report = Some(compensate(&calibrated, &args.program, &setup, &options, &mut nowhere)?);
-        }
-        Some(path) => write_whole(path, |out| {
-            report = Some(compensate(&calibrated, &args.program, &setup, &options, out)?);
+    let mut verified = None;
+    let write = |out: &mut dyn std::io::Write| compensate(&calibrated, &args.program, &setup, &options, out);
+    let report = match &args.output {
+        None => write(&mut std::io::sink())?,
+        Some(path) => write_checked(path, write, |written, report| {
+            if args.no_verify || !report.has_corrected() {
+                return Ok(());
+            }
+            progress.say("reading anew what was written");
+            let files = (args.program.as_path(), written, &**path);
+            verified = Some(verification(&calibrated, files, &setup, &options, report)?);
             Ok(())
         })?,
-    }
+    };
     drop(progress);
-    let Some(report) = report else { return Ok(()) };
     let mut text = render(&report, &args.program.display().to_string());
+    if let Some(verified) = &verified {
+        let _ = writeln!(
+            text,
+            "read anew: {} judged, the tip at most {} off at their ends",
+            count(verified.judged, "move", "moves"),
+            at(verified.largest_end_m, length)
+        );
+    }
     if let Some(tolerance) = args.arcs.filter(|tolerance| report.largest_arc_m.value > *tolerance) {
         let _ = writeln!(
             text,
@@ -157,7 +201,53 @@ pub(crate) fn run(args: &Args) -> Outcome {
         let _ = writeln!(text, "written to {}", path.display());
     }
     args.common.say(&text)?;
-    args.common.write_json(&report)
+    args.common.write_json(&Told { report, verification: verified })
+}
+
+/// What is told in JSON.
+#[derive(serde::Serialize)]
+struct Told {
+    #[serde(flatten)]
+    report: Report,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verification: Option<Verification>,
+}
+
+/// The numbers of a program hold its tip no better than this, m.
+const ROUNDING: f64 = 1e-9;
+
+/// Reads anew what was written, and refuses it where the tip is farther off than the report says. `files`: the program, where the
+/// corrected one stands now, and what it is to be called.
+fn verification(
+    calibrated: &CalibratedMachine,
+    (program, written, name): (&Path, &Path, &Path),
+    setup: &Setup,
+    options: &CompensateOptions,
+    report: &Report,
+) -> Outcome<Verification> {
+    let left = report.largest_left_m.value.max(report.largest_cycle_m.value) + ROUNDING;
+    let mut how = VerifyOptions::default().with_tolerance(left);
+    (how.dialect, how.integer_unit, how.force) = (options.dialect, options.integer_unit, options.force);
+    let found = verify_written(calibrated, program, (written, name), setup, &how)?;
+    if found.holds() {
+        return Ok(found);
+    }
+    let moves = count(found.departures.count, "move", "moves");
+    Err(Failure::Told {
+        what: format!(
+            "{}: read anew, what would be written takes {moves} elsewhere than {} means; nothing is written\n{}",
+            name.display(),
+            program.display(),
+            departures(&found).trim_end()
+        ),
+        mend:
+            "this is a fault of kincal: please report it with the program; --no-verify writes it all the same"
+                .into(),
+    })
+}
+
+fn joint_unit(beyond: &Beyond) -> fn(f64) -> String {
+    if beyond.rotary { angle } else { length }
 }
 
 /// What is less is the rounding of the calculation, m or rad.
@@ -318,10 +408,28 @@ fn notes(r: &Report) -> String {
         );
     }
     if r.extrapolated_moves > 0 {
+        let by = |beyond: &Beyond| format!("{} by up to {}", beyond.joint, at(beyond.by, joint_unit(beyond)));
+        let joints: Vec<String> = r.extrapolated_joints.iter().map(by).collect();
         let _ = writeln!(
             text,
-            "note: {} leave what the calibration has seen",
-            count(r.extrapolated_moves, "move", "moves")
+            "note: {} leave what the calibration has seen: {}",
+            count(r.extrapolated_moves, "move", "moves"),
+            joints.join(", ")
+        );
+    }
+    if r.large_steps.count > 0 {
+        let _ = writeln!(
+            text,
+            "note: larger than --max-step are the steps at {}: {}",
+            count(r.large_steps.count, "block", "blocks"),
+            lines(&r.large_steps, |x| x.line)
+        );
+    }
+    if r.numbers_without_point > 0 {
+        let _ = writeln!(
+            text,
+            "note: {} without a point taken as mm and deg; where the control counts um, say so with --integer-unit um",
+            count(r.numbers_without_point, "axis number", "axis numbers")
         );
     }
     if !r.never_programmed.is_empty() {
@@ -378,5 +486,36 @@ mod tests {
         ));
         report.largest_reversal_m = Worst { value: 3e-6, line: 7 };
         assert!(notes(&report).contains("changes, by at most 3.00 um (line 7): line 7"));
+    }
+
+    /// What is written is right, so a report that claims more stands for what would be wrong.
+    #[test]
+    fn what_is_farther_off_than_reported_is_not_written() {
+        let machine = r#"Machine(name: "slide", units: (length: mm, angle: deg), workpiece: [(frame: "w")],
+            tool: [(frame: "x", joint: Prismatic(axis: "x")), (frame: "t")],
+            calibration: (deviations: [(frame: "x", v: (0.1, 0, 0), w: (0, 0, 0))]))"#;
+        let calibrated = CalibratedMachine::parse("slide.ron", machine).unwrap_or_else(|e| panic!("{e}"));
+        let folder = std::env::temp_dir().join(format!("kincal_read_anew_{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let [program, written] = ["part.nc", "part"].map(|name| folder.join(name));
+        std::fs::write(&program, "G21 G90\nG1 X10. F100\n").expect("a file");
+        let setup = Setup::default();
+        let (options, report) = (CompensateOptions::default(), Report::default());
+        let judge = |text: &str| {
+            std::fs::write(&written, text).expect("a file");
+            let files = (program.as_path(), written.as_path(), Path::new("out.nc"));
+            verification(&calibrated, files, &setup, &options, &report)
+        };
+        assert!(judge("G21 G90\nG1 X9.9 F100\n").is_ok_and(|found| found.judged == 1));
+        let Err(Failure::Told { what, mend }) = judge("G21 G90\nG1 X9.91 F100\n") else {
+            panic!("off by 10 um");
+        };
+        assert!(
+            what.starts_with("out.nc: read anew, what would be written takes 1 move elsewhere than "),
+            "{what}"
+        );
+        assert!(what.contains("line 2 (written in line 2): 10.00 um at its end"), "{what}");
+        assert!(mend.contains("--no-verify"), "{mend}");
+        std::fs::remove_dir_all(&folder).expect("a folder");
     }
 }

@@ -127,19 +127,20 @@ impl<W: Write> Write for Watched<W> {
 }
 
 /// Writes through `out`, and tells an error of the output as such.
-fn write_into(
+fn write_into<T>(
     file: std::fs::File,
     path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> crate::error::Result<()>,
-) -> Outcome {
+    write: impl FnOnce(&mut dyn Write) -> crate::error::Result<T>,
+) -> Outcome<T> {
     let inner = std::io::BufWriter::with_capacity(1 << 18, file);
     let mut out = Watched { inner, failed: None };
     let written = write(&mut out);
     if let Some(source) = out.failed.take() {
         return Err(not_written(path, &source));
     }
-    written?;
-    out.flush().map_err(|source| not_written(path, &source))
+    let told = written?;
+    out.flush().map_err(|source| not_written(path, &source))?;
+    Ok(told)
 }
 
 /// Writes a file whole or not at all: into a neighbour first, then renamed. A link stays a link, and its file is
@@ -148,6 +149,16 @@ pub(crate) fn write_whole(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> crate::error::Result<()>,
 ) -> Outcome {
+    write_checked(path, write, |_, ()| Ok(()))
+}
+
+/// As [`write_whole`], where the file takes its place only if `check` is content with it: that is given the path at which it can be read
+/// until then, and what `write` has told of it. What is no file is not checked.
+pub(crate) fn write_checked<T>(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> crate::error::Result<T>,
+    check: impl FnOnce(&Path, &T) -> Outcome,
+) -> Outcome<T> {
     let failed = |source: std::io::Error| not_written(path, &source);
     let known = std::fs::metadata(path).ok();
     if known.as_ref().is_some_and(|it| !it.is_file() && !it.is_dir()) {
@@ -162,8 +173,10 @@ pub(crate) fn write_whole(
     if let Some(known) = &known {
         file.set_permissions(known.permissions()).map_err(failed)?;
     }
-    write_into(file, path, write)?;
-    part.finish(&target).map_err(failed)
+    let told = write_into(file, path, write)?;
+    check(part.path(), &told)?;
+    part.finish(&target).map_err(failed)?;
+    Ok(told)
 }
 
 /// A spinner on standard error while something lasts; gone when it is dropped.

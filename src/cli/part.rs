@@ -28,6 +28,11 @@ impl Part {
         Ok((Part(path), file))
     }
 
+    /// Where the file is until then.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
     /// Puts the file in the place of `target`.
     pub fn finish(self, target: &Path) -> Result<()> {
         std::fs::rename(&self.0, target)

@@ -7,7 +7,7 @@ use crate::calibration::CalibratedMachine;
 use crate::compensate::{Departure, Setup, Verification, VerifyOptions, verify};
 
 use super::Common;
-use super::compensate::{DialectWord, at, dialect_of, tolerance};
+use super::compensate::{DialectWord, IntegerWord, at, dialect_of, integer_unit_of, tolerance};
 use super::output::{Failure, Outcome, angle, count, length, open_machine};
 
 #[derive(clap::Args)]
@@ -39,6 +39,12 @@ pub(crate) struct Args {
     /// The control, where the program's first lines do not say it
     #[arg(long, value_enum)]
     dialect: Option<DialectWord>,
+    /// What axis numbers without a point count in RS-274 programs
+    #[arg(long, value_enum)]
+    integer_unit: Option<IntegerWord>,
+    /// Compare even where the mark of the compensated program says that it was written from something else
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     common: Common,
 }
@@ -54,6 +60,8 @@ pub(crate) fn run(args: &Args) -> Outcome {
         between: args.between,
         chord: args.chord,
         dialect: args.dialect.map(dialect_of),
+        integer_unit: args.integer_unit.map(integer_unit_of),
+        force: args.force,
     };
     let progress = args.common.progress();
     progress.say(&format!("reading {}", args.compensated.display()));
@@ -82,6 +90,12 @@ fn render(found: &Verification) -> String {
         at(found.largest_axis_rad, angle)
     );
     let _ = writeln!(text, "largest error beside the meant path: {}", at(found.largest_between_m, length));
+    text + &departures(found)
+}
+
+/// The worst of the moves that are not where they are meant.
+pub(super) fn departures(found: &Verification) -> String {
+    let mut text = String::new();
     let mut worst: Vec<_> = found.departures.first.iter().collect();
     let size =
         |d: &Departure| d.end_m.zip(d.between_m).map_or(f64::INFINITY, |(end, between)| end.max(between));

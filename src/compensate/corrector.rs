@@ -1,6 +1,8 @@
 //! The corrector: from a meant position to corrected joint commands, and to the numbers that say so,
 //! `docs/compensate.md` (C9) to (C11).
 
+use std::borrow::Cow;
+
 use super::control::Control;
 use super::interpreter::Interpreter;
 use super::model::Model;
@@ -74,6 +76,10 @@ struct Corrected {
     piece: usize,
 }
 
+/// Each time the correction is found anew, what is still wrong with it shrinks by the slope of the errors, which is a few percent for the
+/// steepest waves of gears; twice makes nothing of a micrometre.
+const SETTLING: usize = 2;
+
 /// A machine with its errors, and the inverse of it.
 pub(super) struct Corrector<'a> {
     machine: &'a Machine,
@@ -120,7 +126,7 @@ impl<'a> Corrector<'a> {
         if last.piece == self.model.piece() {
             return None;
         }
-        let again = self.solve(&self.model.chain_at(&last.meant), program, &last.meant);
+        let (_, again) = self.settle(program, &last.meant, &program.free());
         let control = program.control();
         Some(TipError::between(control.tip_pose(&last.sent), control.tip_pose(&again.commands)))
     }
@@ -128,15 +134,31 @@ impl<'a> Corrector<'a> {
     /// What the model says is wrong where the program means `meant` and the joints are sent to `sent`.
     pub fn error(&self, control: &Control, sent: &[f64], meant: &[f64]) -> TipError {
         let goal = control.goal(meant);
-        TipError::between(self.model.chain_at(meant).w_from_t(sent) * goal.t_from_tip, goal.w_from_tip)
+        TipError::between(self.model.chain_at(sent).w_from_t(sent) * goal.t_from_tip, goal.w_from_tip)
     }
 
-    /// The joint commands that bring tip and axis of a machine with this chain where `meant` has them.
-    pub fn solve(&self, chain: &Chain<f64>, program: &Interpreter, meant: &[f64]) -> Solution {
-        self.solve_with(chain, program, meant, &program.free())
+    /// The chain that holds where the joints are sent so that tip and axis are where `meant` has them, and those joint commands. Errors
+    /// belong to the position that is sent, which the correction itself moves a little.
+    fn settle(&self, program: &Interpreter, meant: &[f64], free: &[bool]) -> (Cow<'_, Chain<f64>>, Solution) {
+        let mut chain = self.model.chain_at(meant);
+        let mut solution = self.solve_with(&chain, program, meant, free);
+        for _ in 0..SETTLING {
+            let there = self.model.chain_at(&solution.commands);
+            if matches!(there, Cow::Borrowed(_)) {
+                break;
+            }
+            chain = there;
+            solution = self.solve_with(&chain, program, meant, free);
+        }
+        (chain, solution)
     }
 
-    /// As [`Corrector::solve`], with these commands free.
+    /// The joint commands that bring tip and axis of the actual machine where `meant` has them.
+    pub fn sent(&self, program: &Interpreter, meant: &[f64]) -> Vec<f64> {
+        self.settle(program, meant, &program.free()).1.commands
+    }
+
+    /// The joint commands that bring tip and axis of a machine with this chain where `meant` has them, with these commands free.
     pub fn solve_with(
         &self,
         chain: &Chain<f64>,
@@ -159,8 +181,7 @@ impl<'a> Corrector<'a> {
     ) -> Correction {
         let control = program.control();
         let free = program.free();
-        let chain = self.model.chain_at(q);
-        let solution = self.solve_with(&chain, program, q, &free);
+        let (chain, solution) = self.settle(program, q, &free);
         let mut exact = solution.commands.clone();
         let mut numbers = Vec::new();
         let mut coordinates = program.written().program().to_vec();
@@ -221,8 +242,7 @@ impl<'a> Corrector<'a> {
         }
         // Where they are unknown, what matters is by how much they would be moved.
         let stands = control.program(q, program.written().program());
-        let moved =
-            control.program(&self.solve_with(&self.model.chain_at(q), program, q, &free).commands, &stands);
+        let moved = control.program(&self.settle(program, q, &free).1.commands, &stands);
         let half = |i: usize| 0.5 * control.si(i, 10f64.powi(-(style.places(control, i) as i32))).abs();
         wanted.extend(slides.into_iter().filter(|i| (moved[*i] - stands[*i]).abs() > half(*i)));
         wanted.sort_unstable();

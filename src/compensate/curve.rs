@@ -40,7 +40,7 @@ pub(super) fn write(
         }
         let q = pass.program().joints(block, &target)?;
         let end = Position::new(q, target);
-        pass.advance(line, end.q());
+        pass.advance(block, end.q())?;
         let correction = pass.correct(block, end.q(), Some(&motion.words))?;
         // An axis beside the plane may come back from where it stood before.
         if correction.numbers().iter().all(|n| motion.words[n.axis()].is_none()) {

@@ -30,7 +30,7 @@ pub(super) fn write(
         target[*i] = pass.program().meant().program()[*i];
     }
     let q = pass.program().joints(block, &target)?;
-    pass.advance(line, &q);
+    pass.advance(block, &q)?;
     pass.need_places(block, motion, &q, &|i| in_plane[i])?;
     let mut correction = pass.correct(block, &q, Some(&motion.words))?;
     correction.keep(&in_plane);

@@ -200,6 +200,10 @@ impl Model for Effects<'_> {
         self.calibrated.extrapolates(commands)
     }
 
+    fn nearest_seen(&self, commands: &[f64]) -> Vec<f64> {
+        self.calibrated.nearest_seen(commands)
+    }
+
     fn restart(&mut self, first: &[i8]) {
         self.walk = walk(self.calibrated, &self.variation, first);
         self.tracker = at_rest(self.calibrated, first);

@@ -37,8 +37,8 @@ impl Envelope {
     }
 }
 
-/// Root mean square of the tip's displacement where each component of each deviation has its tolerance as standard deviation, m.
-fn expected(control: &Control, q: &[f64]) -> f64 {
+/// Root mean square of the tip's displacement where the joints are at `q`, each component of each deviation has its tolerance as standard deviation, m.
+pub(super) fn expected(control: &Control, q: &[f64]) -> f64 {
     let (machine, sweep) = (control.machine(), control.nominal().sweep(q));
     let tip = (sweep.w_from_t() * control.tip()).translation;
     let square = |j: usize| -> f64 {

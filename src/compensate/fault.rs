@@ -124,6 +124,34 @@ pub enum CompensateFault {
         /// The bound, m.
         bound_m: f64,
     },
+    /// Numbers without a point that cannot count micrometres.
+    #[error("numbers without a point are to count um (`--integer-unit um`), and {what}")]
+    Increments {
+        /// Why not.
+        what: &'static str,
+    },
+    /// A program that bears the mark of one that was written here.
+    #[error("this program is compensated already{how}")]
+    Compensated {
+        /// For what and with what, where that is known.
+        how: String,
+    },
+    /// A compensated program that was written from something else.
+    #[error("this program was written {from}")]
+    Foreign {
+        /// From what.
+        from: &'static str,
+    },
+    /// A place so far beyond what the calibration has seen that the model says nothing of it.
+    #[error("the model is continued beyond what its recordings have seen{}: that alone moves the tip by {:.3} mm, more than the {:.3} mm that a machine as declared would be off", of_joints(joints), by_m * 1e3, bound_m * 1e3)]
+    Unseen {
+        /// Joints that are beyond their range.
+        joints: Vec<String>,
+        /// By how much, m.
+        by_m: f64,
+        /// What deviations of the size of the tolerances make, m.
+        bound_m: f64,
+    },
     /// A frame that is not followed.
     #[error("`{what}` changes what coordinates mean in a way that is not followed")]
     Frame {
@@ -172,6 +200,11 @@ fn without(axes: &[String]) -> String {
         return String::new();
     }
     format!(": the program has not placed {} before it", axes.join(", "))
+}
+
+/// ` by c and x`, where there are any.
+fn of_joints(joints: &[String]) -> String {
+    if joints.is_empty() { String::new() } else { format!(" by {}", listed(joints)) }
 }
 
 /// A travel that is exceeded, with its unit.
@@ -269,6 +302,16 @@ impl Fault for CompensateFault {
             }
             TooFar { .. } => {
                 "check that the calibrated file, units, set-up and program belong together; --max-correction LENGTH allows more".into()
+            }
+            Increments { .. } => "leave --integer-unit out, or write the program with points and in mm".into(),
+            Compensated { .. } => {
+                "compensate the program as it was before; --force compensates this one all the same".into()
+            }
+            Foreign { .. } => {
+                "name the program, the set-up and the model that it was written from; --force compares all the same".into()
+            }
+            Unseen { .. } => {
+                "record where the program goes, and calibrate again; --force goes on all the same".into()
             }
             UnknownPlace { axes } => format!(
                 "name {} in this block or before it, or leave such moves as they are with --unknown keep",

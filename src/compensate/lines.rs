@@ -82,7 +82,6 @@ pub(super) fn write(
     arc: Option<&Arc>,
     out: &mut dyn Write,
 ) -> Result<()> {
-    let line = block.line();
     let inverse_time = pass.program().modes().feed == Some(Feed::InverseTime);
     let form = Form::of(block, motion, count, inverse_time);
     let own = if form.last { count } else { 1 };
@@ -93,7 +92,7 @@ pub(super) fn write(
         let point = Position::new(q, program);
         // Of a straight move the model knows the end already, and its direction is one all along.
         if arc.is_some() {
-            pass.advance(line, point.q());
+            pass.advance(block, point.q())?;
         }
         let correction = pass.correct(block, point.q(), (k == own).then_some(&motion.words[..]))?;
         if let (Some(_), Some(tolerance)) = (arc, pass.options().arcs) {

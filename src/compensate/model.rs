@@ -48,6 +48,11 @@ pub trait Model {
     /// Whether a commanded position lies beyond what the calibration has seen.
     fn extrapolates(&self, commands: &[f64]) -> bool;
 
+    /// The commanded position nearest to this one that the calibration has seen; a turning joint may be whole turns away.
+    fn nearest_seen(&self, commands: &[f64]) -> Vec<f64> {
+        commands.to_vec()
+    }
+
     /// Forgets every position told, as at the start of a program. `first`: direction of the first motion of each command, which holds
     /// before it; 0 where that is not known.
     fn restart(&mut self, first: &[i8]);

@@ -12,6 +12,15 @@ pub enum UnknownAxes {
     Keep,
 }
 
+/// What an axis number without a decimal point counts in an RS-274 program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IntegerUnit {
+    /// Millimetres and degrees, as with LinuxCNC: `X10` is `X10.`
+    Mm,
+    /// Least increments of 0.001 mm and 0.001 deg, as with Fanuc: `X10` is `X0.010`.
+    Um,
+}
+
 /// How to write.
 #[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,9 +38,17 @@ pub struct CompensateOptions {
     pub mode: Option<Mode>,
     /// The dialect, where it is not to be taken from the program.
     pub dialect: Option<Dialect>,
+    /// What axis numbers without a point count; without, millimetres and degrees, and the report says how many there are.
+    pub integer_unit: Option<IntegerUnit>,
     /// What becomes of moves that need an axis of which it is not known where it stands; without, rapid moves are kept and
     /// others refused.
     pub unknown: Option<UnknownAxes>,
+    /// Steps of the correction at a reversal that are told apart as too large, m.
+    pub max_step: Option<f64>,
+    /// Whether a comment behind the last block says from what the program was written; where nothing is corrected there is none.
+    pub marked: bool,
+    /// Whether a program is compensated that bears such a comment already, or that goes where the model says nothing.
+    pub force: bool,
 }
 
 impl CompensateOptions {
@@ -81,6 +98,34 @@ impl CompensateOptions {
     #[must_use]
     pub fn with_unknown(mut self, unknown: UnknownAxes) -> Self {
         self.unknown = Some(unknown);
+        self
+    }
+
+    /// The same with another account of numbers without a point.
+    #[must_use]
+    pub fn with_integer_unit(mut self, unit: IntegerUnit) -> Self {
+        self.integer_unit = Some(unit);
+        self
+    }
+
+    /// The same with steps of the correction that are told apart as too large, m.
+    #[must_use]
+    pub fn with_max_step(mut self, step: f64) -> Self {
+        self.max_step = Some(step);
+        self
+    }
+
+    /// The same with a comment behind the last block that says from what the program was written.
+    #[must_use]
+    pub fn with_mark(mut self) -> Self {
+        self.marked = true;
+        self
+    }
+
+    /// The same also for programs that are compensated already, and beyond what the model says.
+    #[must_use]
+    pub fn with_force(mut self) -> Self {
+        self.force = true;
         self
     }
 }

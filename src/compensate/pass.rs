@@ -1,9 +1,10 @@
 //! One pass over a program: where it is, how it is corrected, and what there is to tell of it.
 
+use std::f64::consts::TAU;
 use std::io::Write;
 
 use super::corrector::{Correction, Corrector};
-use super::envelope::Envelope;
+use super::envelope::{Envelope, expected};
 use super::event::Event;
 use super::fault::CompensateFault;
 use super::interpreter::Interpreter;
@@ -13,15 +14,21 @@ use super::options::{CompensateOptions, UnknownAxes};
 use super::output::put;
 use super::position::Position;
 use super::refusal::refuse;
-use super::report::{Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, UnseenPiece};
+use super::report::{
+    Beyond, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, UnseenPiece, Worst,
+};
 use super::style::{Style, plain};
 use super::tip_error::TipError;
 use super::unseen::UnseenSums;
 use super::words;
+use crate::chain::Chain;
 use crate::error::Result;
 use crate::inverse::{Outcome, Solution};
 use crate::machine::JointKind;
 use crate::nc::{Block, Motion, MotionKind};
+
+/// Whole turns are told from others within this, rad; lengths from none, m.
+const NO_WAY: f64 = 1e-9;
 
 /// A program being corrected.
 pub(super) struct Pass<'a> {
@@ -146,20 +153,67 @@ impl<'a> Pass<'a> {
     }
 
     /// As [`Pass::tell`]; where that changes the piece, the step of the correction is noted.
-    pub fn advance(&mut self, line: usize, q: &[f64]) {
+    ///
+    /// # Errors
+    /// [`CompensateFault::Unseen`] where the model is continued too far.
+    pub fn advance(&mut self, block: &Block, q: &[f64]) -> Result<()> {
+        let line = block.line();
         self.tell(line, q);
-        let model = self.corrector.model();
-        if self.extrapolated != line && model.extrapolates(q) {
-            self.extrapolated = line;
-            self.report.extrapolated_moves += 1;
+        if self.corrector.model().extrapolates(q) {
+            self.go_beyond(block, q)?;
         }
-        if let Some(piece) = model.unseen_piece() {
+        if let Some(piece) = self.corrector.model().unseen_piece() {
             self.report.unseen_directions.push_once(UnseenPiece { line, piece }, line);
         }
         if let Some(step) = self.corrector.step(&self.program) {
-            self.report.largest_reversal_m.take(step.m(), line);
-            self.report.reversals.push(Reversal { line, step_m: step.m(), step_rad: step.rad() });
+            let (step_m, step_rad) = (step.m(), step.rad());
+            self.report.largest_reversal_m.take(step_m, line);
+            if self.options.max_step.is_some_and(|most| step_m > most) {
+                self.report.large_steps.push(Reversal { line, step_m, step_rad });
+            }
+            self.report.reversals.push(Reversal { line, step_m, step_rad });
         }
+        Ok(())
+    }
+
+    /// Notes a position beyond what the calibration has seen. What only depends on where the joints are seen to be may be continued as
+    /// long as that moves the tip less than what a machine may be off that was never calibrated.
+    fn go_beyond(&mut self, block: &Block, q: &[f64]) -> Result<()> {
+        let line = block.line();
+        if self.extrapolated != line {
+            self.extrapolated = line;
+            self.report.extrapolated_moves += 1;
+        }
+        let (model, control) = (self.corrector.model(), self.program.control());
+        let nearest = model.nearest_seen(q);
+        let mut joints = Vec::new();
+        for (c, (q, seen)) in q.iter().zip(&nearest).enumerate() {
+            let off = (q - seen).abs();
+            let rotary = control.machine().command_joint(c).kind == JointKind::Revolute;
+            let by = if rotary { off.rem_euclid(TAU) } else { off };
+            if by < NO_WAY || TAU - by < NO_WAY {
+                continue;
+            }
+            let joint = control.machine().commands()[c].clone();
+            match self.report.extrapolated_joints.iter_mut().find(|beyond| beyond.joint == joint) {
+                Some(beyond) => beyond.by.take(by, line),
+                None => {
+                    let by = Worst { value: by, line };
+                    self.report.extrapolated_joints.push(Beyond { joint: joint.clone(), rotary, by });
+                }
+            }
+            joints.push(joint);
+        }
+        if self.options.force || self.program.places().any_parked() {
+            return Ok(());
+        }
+        let tip = |chain: &Chain<f64>| chain.w_from_t(q) * control.tip();
+        let continued = TipError::between(tip(model.chain()), tip(&model.chain_at(&nearest)));
+        let bound_m = expected(control, q);
+        if continued.m() > bound_m {
+            return refuse(block, 0, CompensateFault::Unseen { joints, by_m: continued.m(), bound_m });
+        }
+        Ok(())
     }
 
     /// Refuses or tells a move to `q` that needs axes of which it is not known where they stand; of axes asked of by `is_asked`.

@@ -1,5 +1,6 @@
 //! A calibrated machine without effects: one set of deviations, or one for each pattern of directions of travel.
 
+use std::borrow::Cow;
 use std::rc::Rc;
 
 use super::model::Model;
@@ -79,6 +80,12 @@ impl Model for Pieces<'_> {
         self.bent.as_ref().unwrap_or(&self.chains[self.piece])
     }
 
+    fn chain_at(&self, commands: &[f64]) -> Cow<'_, Chain<f64>> {
+        let dh = || of_piece(self.calibrated, self.piece);
+        let bent = bent(self.calibrated, dh, commands, &self.tracker.directions());
+        bent.map_or_else(|| Cow::Borrowed(self.chain()), Cow::Owned)
+    }
+
     fn piece(&self) -> usize {
         self.piece
     }
@@ -96,6 +103,10 @@ impl Model for Pieces<'_> {
 
     fn extrapolates(&self, commands: &[f64]) -> bool {
         self.calibrated.extrapolates(commands)
+    }
+
+    fn nearest_seen(&self, commands: &[f64]) -> Vec<f64> {
+        self.calibrated.nearest_seen(commands)
     }
 
     fn restart(&mut self, first: &[i8]) {
@@ -150,6 +161,11 @@ impl Model for Constant<'_> {
         self.bent.as_ref().unwrap_or(&self.chain)
     }
 
+    fn chain_at(&self, commands: &[f64]) -> Cow<'_, Chain<f64>> {
+        let bent = bent(self.calibrated, || self.calibrated.deviations().to_vec(), commands, &[]);
+        bent.map_or_else(|| Cow::Borrowed(self.chain()), Cow::Owned)
+    }
+
     fn piece(&self) -> usize {
         0
     }
@@ -160,6 +176,10 @@ impl Model for Constant<'_> {
 
     fn extrapolates(&self, commands: &[f64]) -> bool {
         self.calibrated.extrapolates(commands)
+    }
+
+    fn nearest_seen(&self, commands: &[f64]) -> Vec<f64> {
+        self.calibrated.nearest_seen(commands)
     }
 
     fn restart(&mut self, _: &[i8]) {

@@ -83,6 +83,18 @@ pub struct UnseenPiece {
     pub piece: String,
 }
 
+/// A joint that leaves the range in which the calibration has seen it.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Beyond {
+    /// Name of the joint.
+    pub joint: String,
+    /// Whether it turns.
+    pub rotary: bool,
+    /// By how much at most, m or rad; whole turns do not count.
+    pub by: Worst,
+}
+
 /// An axis comes to a block's end from a place that is not known.
 #[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -169,6 +181,9 @@ pub struct Report {
     pub largest_arc_m: Worst,
     /// Where the correction steps because a direction of travel changed.
     pub reversals: Listed<Reversal>,
+    /// Those of these steps that are larger than was asked for.
+    #[serde(default)]
+    pub large_steps: Listed<Reversal>,
     /// Largest of these steps.
     pub largest_reversal_m: Worst,
     /// Blocks in a pattern of directions that the calibration has not seen; they are corrected by what single directions have
@@ -183,8 +198,15 @@ pub struct Report {
     pub singular: Listed<SingularBlock>,
     /// Blocks whose tip the machine does not reach.
     pub unreachable: Listed<Unreached>,
+    /// Axis numbers without a decimal point, taken as millimetres and degrees; 0 where [`CompensateOptions::integer_unit`](super::CompensateOptions) says what
+    /// they are, and for controls that have no choice.
+    #[serde(default)]
+    pub numbers_without_point: u64,
     /// Moves beyond what the calibration has seen.
     pub extrapolated_moves: u64,
+    /// Joints that leave what the calibration has seen, and how far they do.
+    #[serde(default)]
+    pub extrapolated_joints: Vec<Beyond>,
     /// Addresses that the program never names; their joints were taken where they stand at the start, and
     /// left there.
     pub never_programmed: Vec<String>,
@@ -197,6 +219,13 @@ pub struct Report {
     /// What the calibration has not seen of the errors of tip and tool axis at the ends of these moves;
     /// `None` where that is not known.
     pub unseen: Option<Unseen>,
+}
+
+impl Report {
+    /// Whether anything is written otherwise than it was.
+    pub fn has_corrected(&self) -> bool {
+        self.corrected_words + self.inserted_words + self.split_arcs + self.split_moves > 0
+    }
 }
 
 /// Errors of tip and tool axis that may be left because no recording has shown them. Root mean squares over

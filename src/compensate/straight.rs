@@ -30,7 +30,7 @@ pub(super) fn write(
     let known = !pass.program().places().any_parked() && pass.corrector().has_last();
     let q = pass.program().joints(block, &target)?;
     let end = Position::new(q, target);
-    pass.advance(line, end.q());
+    pass.advance(block, end.q())?;
     pass.need_places(block, motion, end.q(), &|_| true)?;
     let feeds = motion.kind != MotionKind::Rapid;
     if let Some(tolerance) = pass.options().split
@@ -90,7 +90,7 @@ fn unsplit(pass: &Pass, at: &dyn Fn(f64) -> Vec<f64>, count: usize) -> f64 {
     let corrected = |s: f64| -> Option<(Position, Position)> {
         let coordinates = at(s);
         let q = control.joints(&coordinates, program.meant().q())?;
-        let sent = corrector.solve(&corrector.model().chain_at(&q), program, &q).commands;
+        let sent = corrector.sent(program, &q);
         let written = control.program(&sent, &coordinates);
         Some((Position::new(q, coordinates), Position::new(sent, written)))
     };

@@ -2,14 +2,14 @@
 //! every call must need the same.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::{BufRead, Write};
+use std::io::Write;
 
 use super::fault::CompensateFault;
 use super::interpreter::Interpreter;
 use super::output::{put, put_bytes};
 use super::refusal::refuse;
 use crate::error::Result;
-use crate::nc::{Block, Dialect, Program};
+use crate::nc::{Block, Dialect};
 
 /// Most levels of calls.
 const DEEPEST: usize = 10;
@@ -34,6 +34,8 @@ pub(super) struct SubPrograms {
     bodies: BTreeMap<String, Vec<(usize, Vec<u8>)>>,
     /// Of lines of sub-programs.
     written: HashMap<usize, Vec<u8>>,
+    /// Addresses whose numbers without a point count least increments.
+    increments: &'static [&'static str],
     /// Whether what is written is being found, and not yet put out.
     collecting: bool,
 }
@@ -132,6 +134,11 @@ impl Bounds {
 }
 
 impl SubPrograms {
+    /// No sub-programs yet; numbers without a point at these addresses count least increments.
+    pub fn counting(increments: &'static [&'static str]) -> Self {
+        SubPrograms { increments, ..SubPrograms::default() }
+    }
+
     /// A line of the sub-program `name`.
     pub fn add(&mut self, name: &str, block: &Block) {
         self.bodies.entry(name.to_string()).or_default().push((block.line(), block.bytes().to_vec()));
@@ -186,6 +193,7 @@ impl SubPrograms {
         for _ in 0..times {
             for (line, bytes) in &body {
                 let mut inner = Block::of_file(block.file(), *line, bytes.clone(), dialect);
+                inner.count_increments(self.increments);
                 let mut written = Vec::new();
                 self.block(follower, &mut inner, deep + 1, &mut written)?;
                 if !self.collecting {
@@ -203,49 +211,4 @@ impl SubPrograms {
         }
         Ok(())
     }
-}
-
-/// The sub-programs of a file.
-pub(super) fn sub_programs<R: BufRead>(program: &mut Program<R>) -> Result<SubPrograms> {
-    let (dialect, mut bounds, mut calls) = (program.dialect(), Bounds::default(), SubPrograms::default());
-    while let Some(block) = program.next_block()? {
-        if let Some(name) = bounds.of(&block, dialect) {
-            calls.add(&name, &block);
-        }
-    }
-    Ok(calls)
-}
-
-/// One pass, to the end or as far as it is `done`; how many blocks there are.
-pub(super) fn follow<'a, F: Follow<'a>, R: BufRead>(
-    follower: &mut F,
-    program: &mut Program<R>,
-    calls: &mut SubPrograms,
-    out: &mut dyn Write,
-    done: impl Fn(&F) -> bool,
-) -> Result<u64> {
-    let dialect = program.dialect();
-    let mut bounds = Bounds::default();
-    let mut blocks = 0;
-    while let Some(mut block) = program.next_block()? {
-        blocks += 1;
-        if bounds.of(&block, dialect).is_some() {
-            calls.write(&block, out)?;
-        } else {
-            calls.block(follower, &mut block, 0, out)?;
-        }
-        if done(follower) {
-            break;
-        }
-    }
-    Ok(blocks)
-}
-
-/// One pass over a whole program and its sub-programs, of which nothing is written.
-pub(super) fn follow_all<'a, F: Follow<'a>, R: BufRead>(
-    follower: &mut F,
-    open: &dyn Fn() -> Result<Program<R>>,
-) -> Result<u64> {
-    let mut calls = sub_programs(&mut open()?)?;
-    follow(follower, &mut open()?, &mut calls, &mut std::io::sink(), |_| false)
 }

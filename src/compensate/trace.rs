@@ -66,9 +66,9 @@ impl<'a, M: Machine> Trace<'a, M> {
         Trace { program, machine, chord, legs: Vec::new() }
     }
 
-    /// Its moves.
-    pub fn finish(self) -> Vec<Leg> {
-        self.legs
+    /// The moves since this was asked last.
+    pub fn take(&mut self) -> impl Iterator<Item = Leg> {
+        self.legs.drain(..)
     }
 
     fn go(&mut self, block: &Block, motion: &Motion, mut target: Vec<f64>, drills: bool) -> Result<()> {

@@ -1,19 +1,22 @@
 //! Verification: a compensated program is read anew, and where it takes the tip of the calibrated machine is held against where the
 //! original takes that of the nominal one, `docs/compensate.md` (C16).
 
+use std::collections::VecDeque;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::calibrated::model_of;
 use super::interpreter::Interpreter;
+use super::mark::{Mark, Origin};
 use super::model::Model;
+use super::options::IntegerUnit;
+use super::passage::{Passage, Survey, read_as};
 use super::report::{Listed, Worst};
 use super::scout::Scout;
 use super::setup::Setup;
-use super::subprograms::follow_all;
 use super::trace::{Leg, Machine, Sort, Trace};
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
@@ -33,12 +36,23 @@ pub struct VerifyOptions {
     pub chord: f64,
     /// The dialect, where it is not to be taken from the program.
     pub dialect: Option<Dialect>,
+    /// What axis numbers without a point count; without, millimetres and degrees.
+    pub integer_unit: Option<IntegerUnit>,
+    /// Whether they are compared even where the compensated program says that it was written from something else.
+    pub force: bool,
 }
 
 impl Default for VerifyOptions {
     /// 2 um at the ends of moves; moves looked at every millimetre.
     fn default() -> Self {
-        VerifyOptions { tolerance: 2e-6, between: None, chord: 1e-3, dialect: None }
+        VerifyOptions {
+            tolerance: 2e-6,
+            between: None,
+            chord: 1e-3,
+            dialect: None,
+            integer_unit: None,
+            force: false,
+        }
     }
 }
 
@@ -54,6 +68,27 @@ impl VerifyOptions {
     #[must_use]
     pub fn with_between(mut self, between: f64) -> Self {
         self.between = Some(between);
+        self
+    }
+
+    /// The same with a dialect that is not taken from the programs.
+    #[must_use]
+    pub fn with_dialect(mut self, dialect: Dialect) -> Self {
+        self.dialect = Some(dialect);
+        self
+    }
+
+    /// The same with another account of numbers without a point.
+    #[must_use]
+    pub fn with_integer_unit(mut self, unit: IntegerUnit) -> Self {
+        self.integer_unit = Some(unit);
+        self
+    }
+
+    /// The same also where the compensated program says that it was written from something else.
+    #[must_use]
+    pub fn with_force(mut self) -> Self {
+        self.force = true;
         self
     }
 }
@@ -100,10 +135,11 @@ impl Verification {
 }
 
 /// Reads `original` and `compensated` and compares, move by move, where they take the tip: the original on the nominal machine, the
-/// compensated one on the calibrated machine.
+/// compensated one on the calibrated machine. Memory does not grow with the programs, sub-programs aside.
 ///
 /// # Errors
-/// [`Error::Input`] with the line of either program that cannot be followed, [`Error::File`].
+/// [`Error::Input`] with the line of either program that cannot be followed, or of a mark that says that the compensated one was written
+/// from something else; [`Error::File`].
 pub fn verify(
     calibrated: &CalibratedMachine,
     original: impl AsRef<Path>,
@@ -111,37 +147,85 @@ pub fn verify(
     setup: &Setup,
     options: &VerifyOptions,
 ) -> Result<Verification> {
+    let (original, compensated) = (original.as_ref(), compensated.as_ref());
+    verify_written(calibrated, original, (compensated, compensated), setup, options)
+}
+
+/// As [`verify`], where the compensated program stands in a file that has not its name yet; file and name.
+pub(crate) fn verify_written(
+    calibrated: &CalibratedMachine,
+    original: &Path,
+    (file, name): (&Path, &Path),
+    setup: &Setup,
+    options: &VerifyOptions,
+) -> Result<Verification> {
+    let open = |path: &Path| File::open(path).map(BufReader::new).map_err(|e| Error::file(path, e));
+    let meant = || Program::new(original, open(original)?);
+    let written = || Program::new(name, open(file)?);
+    check(calibrated, (&meant, &written), setup, options)
+}
+
+/// As [`verify`], of texts.
+///
+/// # Errors
+/// As [`verify`].
+pub fn verify_text(
+    calibrated: &CalibratedMachine,
+    original: impl AsRef<[u8]>,
+    compensated: impl AsRef<[u8]>,
+    setup: &Setup,
+    options: &VerifyOptions,
+) -> Result<Verification> {
+    let meant = || Program::new("original", original.as_ref());
+    let written = || Program::new("compensated", compensated.as_ref());
+    check(calibrated, (&meant, &written), setup, options)
+}
+
+/// Opens a program anew.
+type Open<'o, R> = &'o dyn Fn() -> Result<Program<R>>;
+
+fn check<A: BufRead, B: BufRead>(
+    calibrated: &CalibratedMachine,
+    (meant, written): (Open<A>, Open<B>),
+    setup: &Setup,
+    options: &VerifyOptions,
+) -> Result<Verification> {
     let machine = calibrated.machine();
-    let nominal = Nominal(Chain::nominal(machine));
-    let open = |path: &Path| {
-        let file = File::open(path).map_err(|e| Error::file(path, e))?;
-        let mut program = Program::new(path, BufReader::new(file))?;
-        if let Some(dialect) = options.dialect {
-            program.set_dialect(dialect);
-        }
+    let meant = || {
+        let mut program = meant()?;
+        read_as(&mut program, options.dialect, options.integer_unit);
         Ok::<_, Error>(program)
     };
-    let (original, compensated) = (original.as_ref(), compensated.as_ref());
-    let start = |dialect| Interpreter::new(machine, setup, dialect);
-    let meant = {
-        let dialect = open(original)?.dialect();
-        let mut trace = Trace::new(start(dialect), nominal, options.chord);
-        follow_all(&mut trace, &|| open(original))?;
-        trace.finish()
+    let written = || {
+        let mut program = written()?;
+        read_as(&mut program, options.dialect, options.integer_unit);
+        Ok::<_, Error>(program)
     };
+    let mut original = Survey::of(meant()?)?;
+    let mut compensated = Survey::of(written()?)?;
+    if !options.force {
+        let origin = Origin::of(calibrated);
+        compensated.refuse_foreign(Mark { program: original.fingerprint, origin })?;
+    }
+    let meant = meant()?;
+    let start = Interpreter::new(machine, setup, meant.dialect());
+    let trace = Trace::new(start, Nominal(Chain::nominal(machine)), options.chord);
+    let mut meant = Moves::new(trace, Passage::new(meant, &mut original.calls));
+    let start = |dialect| Interpreter::new(machine, setup, dialect);
     let mut model = model_of(calibrated);
-    let dialect = open(compensated)?.dialect();
     let mut first = vec![0; machine.commands().len()];
     if !model.keyed().is_empty() {
-        let mut scout = Scout::new(start(dialect), &mut *model);
-        follow_all(&mut scout, &|| open(compensated))?;
+        let program = written()?;
+        let mut scout = Scout::new(start(program.dialect()), &mut *model);
+        let mut passage = Passage::new(program, &mut compensated.calls);
+        while !scout.has_found() && passage.step(&mut scout, &mut std::io::sink())? {}
         first = scout.finish();
     }
     model.restart(&first);
-    let mut trace = Trace::new(start(dialect), Actual(model), options.chord);
-    follow_all(&mut trace, &|| open(compensated))?;
-    let written = trace.finish();
-    let mut found = compare(&meant, &written, options);
+    let written = written()?;
+    let trace = Trace::new(start(written.dialect()), Actual(model), options.chord);
+    let mut written = Moves::new(trace, Passage::new(written, &mut compensated.calls));
+    let mut found = compare(&mut meant, &mut written, options)?;
     found.machine = machine.name().to_string();
     Ok(found)
 }
@@ -168,17 +252,46 @@ impl Machine for Actual<'_> {
     }
 }
 
+/// The moves of a program, as far ahead as they are asked for.
+struct Moves<'a, 'c, M, R> {
+    trace: Trace<'a, M>,
+    passage: Passage<'c, R>,
+    ahead: VecDeque<Leg>,
+}
+
+impl<'a, 'c, M: Machine, R: BufRead> Moves<'a, 'c, M, R> {
+    fn new(trace: Trace<'a, M>, passage: Passage<'c, R>) -> Self {
+        Moves { trace, passage, ahead: VecDeque::new() }
+    }
+
+    /// The move that comes behind so many others.
+    fn ahead(&mut self, count: usize) -> Result<Option<&Leg>> {
+        while self.ahead.len() <= count && self.passage.step(&mut self.trace, &mut std::io::sink())? {
+            self.ahead.extend(self.trace.take());
+        }
+        Ok(self.ahead.get(count))
+    }
+
+    fn next(&mut self) -> Result<Option<Leg>> {
+        self.ahead(0)?;
+        Ok(self.ahead.pop_front())
+    }
+}
+
 /// Each move of the original against the moves that were written for it: one, or the lines in the place of an arc or of a subdivided move.
-fn compare(meant: &[Leg], written: &[Leg], options: &VerifyOptions) -> Verification {
-    let mut found = Verification { moves: meant.len() as u64, ..Verification::default() };
-    let mut rest = written;
+fn compare<A: BufRead, B: BufRead>(
+    meant: &mut Moves<Nominal, A>,
+    written: &mut Moves<Actual, B>,
+    options: &VerifyOptions,
+) -> Result<Verification> {
+    let mut found = Verification::default();
     let mut from: Option<Vec3<f64>> = None;
-    for leg in meant {
+    while let Some(leg) = meant.next()? {
+        found.moves += 1;
         let path: Vec<Vec3<f64>> =
             from.into_iter().chain(leg.tips.iter().map(|pose| pose.translation)).collect();
-        let count = counterpart(leg, &path, rest, options);
-        let (own, behind) = rest.split_at(count.min(rest.len()));
-        rest = behind;
+        let count = counterpart(&leg, &path, written, options)?;
+        let own: Vec<Leg> = written.ahead.drain(..count.min(written.ahead.len())).collect();
         from = leg.tips.last().map(|pose| pose.translation);
         let line = leg.line;
         let Some(last) = own.last().filter(|last| (last.sort == Sort::Sent) == (leg.sort == Sort::Sent))
@@ -209,30 +322,38 @@ fn compare(meant: &[Leg], written: &[Leg], options: &VerifyOptions) -> Verificat
             found.departures.push(Departure { line, compensated_line, end_m, between_m });
         }
     }
-    for leg in rest {
+    while let Some(leg) = written.next()? {
         let more = Departure { line: 0, compensated_line: leg.line, end_m: None, between_m: None };
         found.departures.push(more);
     }
-    found
+    Ok(found)
 }
 
 /// How many of the written moves belong to a move of the original: as many as lead along its path to its end.
-fn counterpart(leg: &Leg, path: &[Vec3<f64>], written: &[Leg], options: &VerifyOptions) -> usize {
-    let Some(goal) = leg.tips.last().filter(|_| matches!(leg.sort, Sort::Straight | Sort::Arc)) else {
-        return 1;
-    };
+fn counterpart<R: BufRead>(
+    leg: &Leg,
+    path: &[Vec3<f64>],
+    written: &mut Moves<Actual, R>,
+    options: &VerifyOptions,
+) -> Result<usize> {
+    let goal = leg.tips.last().filter(|_| matches!(leg.sort, Sort::Straight | Sort::Arc));
     // Pieces lie along the path, as near as what may be left between ends.
     let near = options.between.unwrap_or(0.0).max(10.0 * options.tolerance).max(options.chord);
-    for (k, piece) in written.iter().enumerate() {
-        let Some(tip) = piece.tips.last().filter(|_| piece.sort == Sort::Straight || k == 0) else { break };
+    let mut count = 0;
+    while let Some(piece) = written.ahead(count)? {
+        let Some(goal) = goal else { break };
+        let Some(tip) = piece.tips.last().filter(|_| piece.sort == Sort::Straight || count == 0) else {
+            break;
+        };
         if off(leg.sort, goal, tip) <= options.tolerance {
-            return k + 1;
+            return Ok(count + 1);
         }
         if beside(path, tip.translation) > near {
             break;
         }
+        count += 1;
     }
-    1
+    Ok(1)
 }
 
 /// How far a tip is from its goal, m; of a cycle only across the tool axis.

@@ -32,6 +32,11 @@ impl<'a> Writer<'a> {
         Writer { pass: Pass::new(program, model, options, first) }
     }
 
+    /// Whether anything is written otherwise than it was.
+    pub fn has_corrected(&mut self) -> bool {
+        self.pass.report().has_corrected()
+    }
+
     /// The report of what was written.
     pub fn finish(self) -> Report {
         self.pass.finish()

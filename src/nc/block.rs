@@ -37,6 +37,15 @@ impl Block {
         Block { file, line, bytes, tokens, words, edits: Vec::new() }
     }
 
+    /// Takes numbers without a point at these addresses as counts of a least increment of 0.001 mm or 0.001 deg.
+    pub(crate) fn count_increments(&mut self, addresses: &[&str]) {
+        for word in self.words.iter_mut().filter(|word| addresses.contains(&word.address.as_str())) {
+            if let Value::Number(number) = &mut word.value {
+                *number = number.in_increments(1e-3);
+            }
+        }
+    }
+
     /// The file that the line is from, as the user named it.
     pub(crate) fn file(&self) -> Arc<Path> {
         self.file.clone()

@@ -58,6 +58,11 @@ impl Number {
         Some((Number { value, decimals, whole, has_point, padded, plus, comma }, end))
     }
 
+    /// The number where it counts least increments of this size, if it has no point: such a count is written with one from then on.
+    pub(super) fn in_increments(self, size: f64) -> Number {
+        if self.has_point { self } else { Number { value: self.value * size, has_point: true, ..self } }
+    }
+
     /// `value` as the writer of this number would have written it.
     ///
     /// It has `decimals` digits behind the point where that is more than this number has; of these, zeros at the end that go

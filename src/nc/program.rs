@@ -33,6 +33,8 @@ pub struct Program<R> {
     /// Number of the block that was returned last.
     line: usize,
     ended: bool,
+    /// Addresses whose numbers without a point count least increments.
+    increments: &'static [&'static str],
 }
 
 impl Program<BufReader<File>> {
@@ -79,7 +81,17 @@ impl<R: BufRead> Program<R> {
     /// Reads from `source`, named `file` in messages, in a dialect that is known.
     pub fn with_dialect(file: impl AsRef<Path>, source: R, dialect: Dialect) -> Self {
         let file = Arc::from(file.as_ref());
-        Program { file, source, dialect, head: VecDeque::new(), stop: None, read: 0, line: 0, ended: false }
+        Program {
+            file,
+            source,
+            dialect,
+            head: VecDeque::new(),
+            stop: None,
+            read: 0,
+            line: 0,
+            ended: false,
+            increments: &[],
+        }
     }
 
     /// The dialect in which blocks are read.
@@ -90,6 +102,16 @@ impl<R: BufRead> Program<R> {
     /// Reads the blocks that follow in another dialect.
     pub fn set_dialect(&mut self, dialect: Dialect) {
         self.dialect = dialect;
+    }
+
+    /// Takes numbers without a point at these addresses as counts of a least increment, 0.001 mm or 0.001 deg.
+    pub(crate) fn count_increments(&mut self, addresses: &'static [&'static str]) {
+        self.increments = addresses;
+    }
+
+    /// Addresses whose numbers without a point count least increments.
+    pub(crate) fn increments(&self) -> &'static [&'static str] {
+        self.increments
     }
 
     /// The next block; `None` behind the last, and behind a fault.
@@ -108,7 +130,11 @@ impl<R: BufRead> Program<R> {
         self.ended = !matches!(line, Ok(Some(_)));
         let line = line?;
         self.line += 1;
-        Ok(line.map(|bytes| Block::of_file(self.file.clone(), self.line, bytes, self.dialect)))
+        Ok(line.map(|bytes| {
+            let mut block = Block::of_file(self.file.clone(), self.line, bytes, self.dialect);
+            block.count_increments(self.increments);
+            block
+        }))
     }
 
     /// The next line with its line end.

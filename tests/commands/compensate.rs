@@ -154,7 +154,7 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
         calibrate_model(&machine, &[measured], &model, CalibrateOptions::default(), &|_| {})
             .unwrap_or_else(|e| panic!("{e}"));
     std::fs::write(bench.0.0.join("machine.ron"), calibrated.to_ron()).expect("writable");
-    let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
+    let out = bench.run(&["-o", "out.nc", "--json", "out.json", "--max-step", "8um"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let said = text(&out.stdout);
     // Where the machine came from before line 2 is not known: the direction of each axis' first motion, C down in line 4 and A down in
@@ -165,6 +165,7 @@ fn reversals_and_directions_never_seen_are_told_with_their_lines() {
         "from where a, c comes at line 2 is not known; taken is the direction of its first motion",
         "at 1 block the axes travel in a pattern of directions that the calibration has not seen (AFCF)",
         "have shown: line 7",
+        "larger than --max-step are the steps at 1 block: line 7",
     ];
     for part in parts {
         assert!(said.contains(part), "{part}\n{said}");
@@ -209,4 +210,42 @@ fn what_an_m_code_moves_is_taken_from_a_file() {
     bench.0.write("codes.ron", "{\"M170\": []}");
     let out = bench.run(&["-o", "out.nc", "--m-codes", "codes.ron"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
+}
+
+#[test]
+fn what_was_written_is_read_anew_and_marked() {
+    let bench = Bench::new("mark", PROGRAM);
+    let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert!(
+        text(&out.stdout).contains("read anew: 2 moves judged, the tip at most "),
+        "{}",
+        text(&out.stdout)
+    );
+    let json: serde_json::Value =
+        serde_json::from_str(&bench.read("out.json").expect("written")).expect("JSON");
+    assert_eq!(json["verification"]["judged"], 2, "{json}");
+    assert_eq!(json["verification"]["departures"]["count"], 0, "{json}");
+    let written = bench.read("out.nc").expect("written");
+    assert!(written.lines().last().is_some_and(|line| line.starts_with("(KINCAL ")), "{written}");
+    // The mark names what the program was, and once is enough.
+    bench.0.write("part.nc", &written);
+    let again = bench.run(&["-o", "again.nc"]);
+    assert_eq!(again.status.code(), Some(1));
+    let said = text(&again.stderr);
+    assert!(
+        said.contains(
+            "part.nc:5:1: this program is compensated already, for this machine and with this model"
+        ),
+        "{said}"
+    );
+    assert!(bench.read("again.nc").is_none());
+    assert!(bench.run(&["-o", "again.nc", "--force", "--no-verify"]).status.success());
+    let verify = command()
+        .current_dir(bench.0.path(""))
+        .args(["verify", "part.nc", "out.nc", "machine.ron"])
+        .output()
+        .expect("the program runs");
+    assert_eq!(verify.status.code(), Some(1));
+    assert!(text(&verify.stderr).contains("out.nc:5:1: this program was written from another program"));
 }

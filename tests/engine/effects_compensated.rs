@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 
 use crate::common;
-use kincal::compensate::{CompensateOptions, Report, Setup, compensate_text};
+use kincal::compensate::{CompensateOptions, Report, Setup, VerifyOptions, compensate_text, verify_text};
 use kincal::diagnose::{DiagnoseOptions, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts, StoredEffect};
 use kincal::predict::predict;
@@ -76,9 +76,13 @@ fn program(path: &[Vec<f64>]) -> String {
 fn compensated(model: &CalibratedMachine, path: &[Vec<f64>]) -> (Vec<Vec<f64>>, Report) {
     let setup = "Setup(tools: {\"1\": 120}, reference_length: 120, work_offsets: {\"G54\": {\"X\": 0, \"Y\": 0, \"Z\": -120}})";
     let setup = Setup::parse("setup.ron", setup).unwrap_or_else(|e| panic!("{e}"));
-    let (text, report) =
-        compensate_text(model, "part.nc", program(path), &setup, &CompensateOptions::default())
-            .unwrap_or_else(|e| panic!("{e}"));
+    let program = program(path);
+    let (text, report) = compensate_text(model, "part.nc", &program, &setup, &CompensateOptions::default())
+        .unwrap_or_else(|e| panic!("{e}"));
+    // With play and waves, too, what was written is where it says.
+    let options = VerifyOptions::default().with_tolerance(report.largest_left_m.value + 1e-9);
+    let found = verify_text(model, &program, &text, &setup, &options).unwrap_or_else(|e| panic!("{e}"));
+    assert!(found.holds() && found.judged as usize == path.len(), "{found:?}");
     let sent = text.lines().filter(|line| line.starts_with("N1 ")).map(|line| {
         let word = |letter: char| line.split(' ').find_map(|w| w.strip_prefix(letter)).expect("a word");
         ['Y', 'X', 'Z'].map(|l| word(l).parse::<f64>().expect("a number") / 1e3).to_vec()

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use crate::common;
 use kincal::compensate::{
-    CompensateOptions, Model, Report, Setup, UnknownAxes, compensate_text, compensate_with,
+    CompensateOptions, IntegerUnit, Model, Report, Setup, UnknownAxes, VerifyOptions, compensate_text,
+    compensate_with, verify_text,
 };
 use kincal::lie::{Twist, Vec3};
 use kincal::nc::{Program, State};
@@ -479,6 +480,37 @@ fn every_bad_program_has_a_message_and_a_mend() {
     insta::assert_snapshot!(lines.join("\n"));
 }
 
+#[test]
+fn numbers_without_a_point_count_what_is_said() {
+    let calibrated = erroneous("ac_table_tilting", 1.0);
+    let um = CompensateOptions::default().with_integer_unit(IntegerUnit::Um);
+    let counted = "G90 G0 X10000 Y-5000 Z30. A20000 C0\nG1 X20500 F500\nG91 G1 X-1000 C007500\nG90 G3 X19500 Y0 I0 J2500 F300\nM30\n";
+    let pointed = "G90 G0 X10. Y-5. Z30. A20. C0\nG1 X20.5 F500\nG91 G1 X-1. C7.5\nG90 G3 X19.5 Y0. I0. J2.5 F300\nM30\n";
+    let arcs = |options: CompensateOptions| options.with_arcs(5e-6);
+    let (a, told) = run(&calibrated, counted, &arcs(um));
+    let (b, _) = run(&calibrated, pointed, &arcs(CompensateOptions::default()));
+    // The same places, whatever their numbers look like.
+    let read_a = |text: &str| {
+        let how = VerifyOptions::default().with_integer_unit(IntegerUnit::Um);
+        verify_text(&calibrated, counted, text, &Setup::default(), &how).unwrap_or_else(|e| panic!("{e}"))
+    };
+    assert!(read_a(&a).holds(), "{a}");
+    assert!(read_a(&b).largest_end_m.value < 2e-6, "{b}");
+    assert_eq!(told.numbers_without_point, 0);
+    // By default they are millimetres, and it is told that there are such.
+    let (_, told) =
+        run(&calibrated, "G90 G0 X10 Y-5 Z30. A20 C0\nG1 X20.5 F500\n", &CompensateOptions::default());
+    assert_eq!(told.numbers_without_point, 3);
+    let refused = |text: &str, options: &CompensateOptions| {
+        let out = compensate_text(&calibrated, "part.nc", text, &Setup::default(), options);
+        out.err().map_or_else(String::new, |error| format!("{error} | {}", error.mend()))
+    };
+    let inch = refused("G90\nG20 G0 X10\n", &um);
+    assert!(inch.starts_with("part.nc:2:1: numbers without a point are to count um"), "{inch}");
+    let siemens = refused("G90\nG0 X10\n", &um.with_dialect(kincal::nc::Dialect::Siemens));
+    assert!(siemens.contains("this control never does") && siemens.contains("--integer-unit"), "{siemens}");
+}
+
 mod data_sets {
     use super::*;
 
@@ -501,6 +533,10 @@ mod data_sets {
             let (out, report) = with_setup(&calibrated, &text, setup, &options);
             assert!(report.split_arcs > 50 && report.largest_arc_m.value <= 5e-6, "{name}: {report:?}");
             assert!(report.largest_left_m.value < 2e-6, "{name}: {:?}", report.largest_left_m);
+            let how = VerifyOptions::default().with_tolerance(report.largest_left_m.value + 1e-9);
+            let setup = Setup::parse("setup.ron", setup).unwrap_or_else(|e| panic!("{e}"));
+            let found = verify_text(&calibrated, &text, &out, &setup, &how).unwrap_or_else(|e| panic!("{e}"));
+            assert!(found.holds() && found.judged > 500, "{name}: {found:?}");
             // What is no motion stays as it was.
             let still = |text: &str| -> Vec<String> {
                 let quiet = ["MSG", "CYCLE", "DEF", "T=", "TRA", "AROT", "SUPA", ";", "M5", "M6", "COMPOF"];

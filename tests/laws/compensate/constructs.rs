@@ -24,7 +24,12 @@ fn outcomes(folder: &str, dialect: Dialect) -> String {
                 );
                 format!("REFUSED {error} | {}", error.mend())
             }
-            Ok((out, _)) => {
+            Ok((out, report)) => {
+                let left = report.largest_left_m.value.max(report.largest_cycle_m.value);
+                let how = VerifyOptions::default().with_tolerance(left + 1e-9).with_dialect(dialect);
+                let found = verify_text(&calibrated, &text, &out, &setup, &how);
+                let found = found.unwrap_or_else(|e| panic!("{name}: {e}\n{out}"));
+                assert!(found.holds(), "{name}: {found:?}\n{out}");
                 let lines: Vec<&str> = out.lines().skip(3).collect();
                 format!("{name}: {}", lines.join(" | "))
             }
