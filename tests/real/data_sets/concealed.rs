@@ -1,7 +1,7 @@
 //! Known effects put into real recordings: the command column of one joint is rewritten, so that noise, drift and every other fault
 //! stay the machine's own. A recording whose command is `q - e` and whose reading is that of `q` is one of a machine that is `e` off.
 //!
-//! Used by the tests beside and by `examples/measure`, which measures how often what is concealed is named.
+//! The section `concealed` of `examples/benchmarks` measures how often what is concealed is named.
 #![allow(dead_code)]
 
 use kincal::Machine;

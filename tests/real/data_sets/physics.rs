@@ -1,7 +1,6 @@
 //! Physics by name on recordings of real machines: effects that are given, not searched for, judged where they were not fitted.
 //!
-//! `cargo test --release --test real physics -- --ignored --nocapture` prints the figures of `docs/real-recordings.md`;
-//! `cargo run --release --features measure --example measure -- terms SET TERMS` fits a set with other effects.
+//! `cargo test --release --test real physics -- --ignored --nocapture` prints the figures of `docs/real-recordings.md`.
 
 use kincal::effects::Library;
 use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};

@@ -1,7 +1,7 @@
 //! Recordings of real machines, other people's data beside the project: geometry alone, judged where it was not fitted.
 //!
 //! `cargo test --release --test real recordings -- --ignored --nocapture` prints the figures of `docs/accuracy.md`;
-//! `cargo run --release --features measure --example measure -- losses` and `-- tolerances` how losses and tolerances compare.
+//! the sections `losses` and `tolerances` of `examples/benchmarks` say how losses and tolerances compare.
 
 use kincal::identify::{CalibrateOptions, calibrate};
 
