@@ -14,6 +14,7 @@ mod location;
 mod output;
 mod part;
 mod predict;
+mod program;
 mod simulate;
 mod verdict;
 mod verify;

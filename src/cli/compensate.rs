@@ -5,17 +5,15 @@ use std::path::{Path, PathBuf};
 
 use crate::calibration::CalibratedMachine;
 use crate::compensate::{
-    Beyond, CompensateOptions, IntegerUnit, Listed, Report, Setup, UnknownAxes, UnknownWay, Verification,
-    VerifyOptions, Worst, compensate, verify_written,
+    Beyond, CompensateOptions, Listed, Report, Setup, UnknownAxes, UnknownWay, Verification, VerifyOptions,
+    compensate, verify_written,
 };
 use crate::inverse::Mode;
-use crate::nc::Dialect;
-use crate::units::{Quantity, Unit};
 
 use super::Common;
 use super::files::Output;
 use super::output::{Failure, Outcome, angle, count, length, open_machine, write_checked};
-use super::verify::departures;
+use super::program::{DialectWord, IntegerWord, at, departures, dialect_of, integer_unit_of, tolerance};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -87,54 +85,6 @@ enum UnknownWord {
     Refuse,
     /// Leave it as it is, and tell
     Keep,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-pub(super) enum DialectWord {
-    /// LinuxCNC, Fanuc, Haas and their kin
-    Rs274,
-    Siemens,
-    Heidenhain,
-}
-
-#[derive(Clone, Copy, clap::ValueEnum)]
-pub(super) enum IntegerWord {
-    /// Millimetres and degrees
-    Mm,
-    /// Thousandths of them, the least increments of the control
-    Um,
-}
-
-/// The unit of a word.
-pub(super) fn integer_unit_of(word: IntegerWord) -> IntegerUnit {
-    match word {
-        IntegerWord::Mm => IntegerUnit::Mm,
-        IntegerWord::Um => IntegerUnit::Um,
-    }
-}
-
-/// The dialect of a word.
-pub(super) fn dialect_of(word: DialectWord) -> Dialect {
-    match word {
-        DialectWord::Rs274 => Dialect::Rs274,
-        DialectWord::Siemens => Dialect::Siemens,
-        DialectWord::Heidenhain => Dialect::Heidenhain,
-    }
-}
-
-/// A length with its unit, m.
-pub(super) fn tolerance(text: &str) -> Result<f64, String> {
-    let digits = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
-    let (number, unit) = text.split_at(digits);
-    let unit = Unit::named(unit.trim()).filter(|u| u.quantity == Quantity::Length);
-    match (number.trim().parse::<f64>(), unit) {
-        (Ok(number), Some(unit)) if number > 0.0 && number.is_finite() => Ok(unit.to_si(number)),
-        (Ok(_), Some(_)) => Err("expected a length above zero".into()),
-        (Ok(_), None) => {
-            Err(format!("expected a unit behind the number: {}", Unit::symbols_of(Quantity::Length)))
-        }
-        _ => Err("expected a length with its unit, such as 0.002mm".into()),
-    }
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
@@ -252,13 +202,6 @@ fn joint_unit(beyond: &Beyond) -> fn(f64) -> String {
 
 /// What is less is the rounding of the calculation, m or rad.
 const NOTHING: f64 = 1e-11;
-
-pub(super) fn at(worst: Worst, show: fn(f64) -> String) -> String {
-    match worst.line {
-        0 => show(worst.value),
-        line => format!("{} (line {line})", show(worst.value)),
-    }
-}
 
 /// `lines 3, 7, 9 and 12 more`.
 fn lines<T>(listed: &Listed<T>, line: impl Fn(&T) -> usize) -> String {

@@ -4,11 +4,11 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
-use crate::compensate::{Departure, Setup, Verification, VerifyOptions, verify};
+use crate::compensate::{Setup, Verification, VerifyOptions, verify};
 
 use super::Common;
-use super::compensate::{DialectWord, IntegerWord, at, dialect_of, integer_unit_of, tolerance};
 use super::output::{Failure, Outcome, angle, count, length, open_machine};
+use super::program::{DialectWord, IntegerWord, at, departures, dialect_of, integer_unit_of, tolerance};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -91,29 +91,4 @@ fn render(found: &Verification) -> String {
     );
     let _ = writeln!(text, "largest error beside the meant path: {}", at(found.largest_between_m, length));
     text + &departures(found)
-}
-
-/// The worst of the moves that are not where they are meant.
-pub(super) fn departures(found: &Verification) -> String {
-    let mut text = String::new();
-    let mut worst: Vec<_> = found.departures.first.iter().collect();
-    let size =
-        |d: &Departure| d.end_m.zip(d.between_m).map_or(f64::INFINITY, |(end, between)| end.max(between));
-    worst.sort_by(|a, b| size(b).total_cmp(&size(a)));
-    for departure in worst.into_iter().take(10) {
-        let written = departure.compensated_line;
-        let _ = match (departure.line, departure.end_m, departure.between_m) {
-            (line, Some(end), Some(between)) => writeln!(
-                text,
-                "  line {line} (written in line {written}): {} at its end, {} beside its path",
-                length(end),
-                length(between)
-            ),
-            (0, ..) => {
-                writeln!(text, "  line {written} of what was written: a move that the original does not have")
-            }
-            (line, ..) => writeln!(text, "  line {line}: no move was written for it"),
-        };
-    }
-    text
 }
