@@ -166,6 +166,7 @@ impl Columns {
             Role::ToolPoint(i) => self.places.tool_point(i),
             Role::Zero(i) => self.places.zero(i),
             Role::Length(i) => self.places.length(i),
+            Role::ToolRotation(i) => self.places.tool_rotation(i),
             Role::Part { .. } | Role::Term(_) => self.count(),
         }
     }
@@ -288,6 +289,9 @@ fn rows(
                     }
                     if let Known::Unknown(l) = source.length {
                         put(Role::Length(l), 4, 1);
+                    }
+                    if let Known::Unknown(r) = source.tool_rotation {
+                        put(Role::ToolRotation(r), 5, 3);
                     }
                 }
                 linear.lines.push(chunk.lines[k]);

@@ -255,6 +255,14 @@ pub fn is_named(planted: &Planted, said: &Option<Nonsense>) -> bool {
 /// Sound recordings: random errors up to three tolerances, any instrument, noise up to a tolerance, up to 10 % outliers, few samples and
 /// many. Of each whether it was refused, and how near it came: the largest excess.
 pub fn sound(name: &str, draw: u64) -> (Option<Nonsense>, f64) {
+    let (machine, recordings) = (machine(name), [sound_recording(name, draw)]);
+    let said = nonsense(&machine, &recordings, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let (_, fit) = calibrate(&machine, &recordings, CalibrateOptions::default()).expect("sound");
+    (said, fit.plausibility.iter().map(Plausibility::excess).fold(0.0, f64::max))
+}
+
+/// One of them.
+pub fn sound_recording(name: &str, draw: u64) -> Recording {
     let machine = machine(name);
     let mut random = Random::new(draw);
     let kinds = [Sensor::Position, Sensor::Pose, Sensor::Distance { absolute: true }];
@@ -266,10 +274,7 @@ pub fn sound(name: &str, draw: u64) -> (Option<Nonsense>, f64) {
     instrument.outlier = kincal::units::ByQuantity { m: 1.0, rad: 1.0 };
     let samples = random.between(60.0, 400.0) as usize;
     let text = text(&machine, &instrument, random.between(0.0, 3.0), samples, 1000 + draw);
-    let recordings = [read(&text, &machine)];
-    let said = nonsense(&machine, &recordings, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
-    let (_, fit) = calibrate(&machine, &recordings, CalibrateOptions::default()).expect("sound");
-    (said, fit.plausibility.iter().map(Plausibility::excess).fold(0.0, f64::max))
+    read(&text, &machine)
 }
 
 /// RMS of positions that a calibration leaves where deviations are so many times the tolerances, m, and what is to be careful about.
