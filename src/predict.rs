@@ -289,7 +289,10 @@ pub(crate) fn sensor_state(
             let known: Vec<&str> = calibrated.tool_rotations.iter().map(|(n, _)| n.as_str()).collect();
             found
                 .ok_or_else(|| {
-                    missing(format!("the rotation of target \"{name}\" is not in the calibrated file"), &known)
+                    missing(
+                        format!("the rotation of target \"{name}\" is not in the calibrated file"),
+                        &known,
+                    )
                 })?
                 .1
         }

@@ -43,7 +43,8 @@ pub(crate) fn of_recordings(
     let mut notes = Vec::new();
     if let Some(moved) = moved {
         let kind = if moved.left.of_angles { Kind::Angle } else { Kind::Length };
-        let of = if moved.setup.is_empty() { String::new() } else { format!(" of set-up \"{}\"", moved.setup) };
+        let of =
+            if moved.setup.is_empty() { String::new() } else { format!(" of set-up \"{}\"", moved.setup) };
         let time = moved.time.map_or_else(String::new, |t| format!(", t = {t} s"));
         let what = format!(
             "{}:{}{time}: the instrument{of} was moved before this line, by {} and {}: {} are left with one place, {} with two",
@@ -97,7 +98,11 @@ fn in_words(nonsense: &Nonsense) -> String {
     let kind = if left.of_angles { Kind::Angle } else { Kind::Length };
     let show = |si: f64| if si.is_finite() { kind.show(si) } else { "no number".into() };
     if let Some(apart) = &nonsense.apart {
-        let name = if apart.setup.is_empty() { "the set-up without a name".into() } else { format!("set-up \"{}\"", apart.setup) };
+        let name = if apart.setup.is_empty() {
+            "the set-up without a name".into()
+        } else {
+            format!("set-up \"{}\"", apart.setup)
+        };
         let mut text = format!(
             "{}: {name} contradicts the other set-ups: {} are left, where it leaves {} alone and tolerances and instrument make {}",
             left.recording,

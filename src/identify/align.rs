@@ -127,9 +127,7 @@ fn align_one_way(
             m_from_w = next;
             let shifted = shift_tool_points(sources, &kept, m_from_w, unknowns);
             let turned = shift_tool_rotations(sources, &kept, m_from_w, unknowns);
-            if !(shifted || turned)
-                || moved.v.norm() + moved.w.norm() < 1e-7
-            {
+            if !(shifted || turned) || moved.v.norm() + moved.w.norm() < 1e-7 {
                 break;
             }
         }

@@ -170,7 +170,9 @@ impl Change {
             Change::Quaternion { scalar_last: true } => "the scalar part of quaternions read last".into(),
             Change::Quaternion { scalar_last: false } => "the scalar part of quaternions read first".into(),
             Change::Inverse => "the measured pose inverted".into(),
-            Change::Target { place, rotation } => format!("{} unknown, one for each set-up,", target(*place, *rotation)),
+            Change::Target { place, rotation } => {
+                format!("{} unknown, one for each set-up,", target(*place, *rotation))
+            }
             Change::Frame => "frame w unknown".into(),
             Change::Unsettled(parts) => {
                 let all: Vec<String> = (machine.commands().iter().zip(parts))

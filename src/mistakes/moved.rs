@@ -9,11 +9,13 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::rows::{Rows, Seen};
 use super::thinned::{Sample, Thinned};
 use crate::error::Result;
-use crate::lie::Vec3;
 use crate::identify::{CalibrateOptions, Plausibility, calibrate};
+use crate::lie::Vec3;
 use crate::machine::Machine;
 use crate::recording::Measurement;
 
+/// So many samples of a set-up, evenly spread, show a step.
+const ENOUGH: usize = 2000;
 /// A part has as many readings for each of its six unknowns at least, so that as much is left over as is used up.
 const READINGS_EACH: usize = 2;
 /// Two places are tried in earnest where one recording in a hundred without a step would show as much.
@@ -21,8 +23,13 @@ const BY_CHANCE: f64 = 0.01;
 /// Two places must leave less than this part of what one leaves: three quarters of it were the step. Whatever else a machine does differently
 /// from one half of a recording to the other would have to be as large as all the rest together.
 const MOSTLY_THE_STEP: f64 = 0.5;
-/// So large a part of the step is there between neighbours of the change; what creeps from one place to the other is no step.
+/// So large a part of the step is there between neighbours of the change, as lines through the quarters of both sides next to it have it; what
+/// creeps or swings from one place to the other is no step.
 const SUDDEN: f64 = 0.5;
+const NEXT_TO_IT: usize = 4;
+/// Two groups by the direction or the speed of a joint must not explain so large a part of what the step does: play and lag change with the
+/// motion, and the motion may have changed there.
+const BY_MOTION: f64 = 0.5;
 /// Eigenvalues below this part of the largest are not seen.
 const UNSEEN: f64 = 1e-9;
 
@@ -58,6 +65,7 @@ pub(super) fn moved(machine: &Machine, rows: &Rows) -> Result<Option<Moved>> {
         if own.iter().all(|s| time(s).is_some()) {
             own.sort_by(|a, b| time(a).partial_cmp(&time(b)).unwrap_or(std::cmp::Ordering::Equal));
         }
+        let own: Vec<&Seen> = own.iter().copied().step_by(own.len().div_ceil(ENOUGH).max(1)).collect();
         let Some(at) = change_point(&own) else { continue };
         if let Some(moved) = in_earnest(machine, rows, setup, own[at])? {
             return Ok(Some(moved));
@@ -154,7 +162,8 @@ fn change_point(all: &[&Seen]) -> Option<usize> {
     let least = 6 * READINGS_EACH;
     let (_, alone) = sums.still(0, count);
     let gain = |at: usize| sums.still(0, at).1 + sums.still(at, count).1 - alone;
-    let possible = (1..count).filter(|at| sums.readings[*at] >= least && readings - sums.readings[*at] >= least);
+    let possible =
+        (1..count).filter(|at| sums.readings[*at] >= least && readings - sums.readings[*at] >= least);
     let (at, gain) = possible.map(|at| (at, gain(at))).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let squares: f64 = all.iter().flat_map(|s| &s.residuals).map(|r| r * r).sum();
     let noise = (squares - alone - gain).max(0.0) / (readings.saturating_sub(18).max(1)) as f64;
@@ -165,25 +174,46 @@ fn change_point(all: &[&Seen]) -> Option<usize> {
     }
     // The step as constants have it, and as lines on both sides have it there.
     let s = at as f64 / count as f64;
+    let enough = |from: usize, to: usize| sums.readings[to] - sums.readings[from] >= 2 * least;
+    let from = (0..at).rev().find(|from| NEXT_TO_IT * (at - from) >= at && enough(*from, at)).unwrap_or(0);
+    let to =
+        (at + 1..count).find(|to| NEXT_TO_IT * (to - at) >= count - at && enough(at, *to)).unwrap_or(count);
     let step = |far: DVector<f64>, near: DVector<f64>| -> f64 {
-        let rows = all.iter().flat_map(|seen| &seen.by_frame);
+        let rows = all[from..to].iter().flat_map(|seen| &seen.by_frame);
         let by = far - near;
         rows.map(|row| DVector::from_column_slice(row).dot(&by).powi(2)).sum::<f64>().sqrt()
     };
     let constant = step(sums.still(at, count).0, sums.still(0, at).0);
-    let enough = |from: usize, to: usize| sums.readings[to] - sums.readings[from] >= 2 * least;
     let near = |from: usize, to: usize| match enough(from, to) {
         true => sums.going_on(from, to, s).0,
         false => sums.still(from, to).0,
     };
-    let sudden = step(near(at, count), near(0, at));
-    (sudden >= SUDDEN * constant).then_some(at)
+    let sudden = step(near(at, to), near(from, at)) >= SUDDEN * constant;
+    let commands = all[0].way.len();
+    let by_motion = |c: usize| {
+        let speed = |part: &[&Seen]| {
+            let mut all: Vec<f64> = part.iter().map(|seen| seen.way[c].abs()).collect();
+            all.sort_by(f64::total_cmp);
+            all[all.len() / 2]
+        };
+        let between = (speed(&all[..at]) * speed(&all[at..])).sqrt();
+        let by_direction = grouped(all, |seen| seen.way[c] > 0.0);
+        by_direction.max(grouped(all, |seen| seen.way[c].abs() > between)) - alone
+    };
+    (sudden && (0..commands).all(|c| by_motion(c) < BY_MOTION * gain)).then_some(at)
+}
+
+/// By how much two rigid motions lower the sum of squares, one of each group.
+fn grouped(all: &[&Seen], is_one: impl Fn(&Seen) -> bool) -> f64 {
+    let (one, other): (Vec<&Seen>, Vec<&Seen>) = all.iter().copied().partition(|seen| is_one(seen));
+    [one, other].iter().map(|group| Sums::of(group).still(0, group.len()).1).sum()
 }
 
 /// Calibrates with two places from that sample on.
 fn in_earnest(machine: &Machine, rows: &Rows, setup: &str, first: &Seen) -> Result<Option<Moved>> {
     let at = &rows.thinned[first.recording].samples[first.place];
-    let names = ["(first place)", "(second place)"].map(|place| format!("{setup} {place}").trim().to_string());
+    let names =
+        ["(first place)", "(second place)"].map(|place| format!("{setup} {place}").trim().to_string());
     let mut parts = Vec::new();
     for (index, thinned) in rows.thinned.iter().enumerate() {
         if thinned.header.setup != setup {
@@ -203,15 +233,20 @@ fn in_earnest(machine: &Machine, rows: &Rows, setup: &str, first: &Seen) -> Resu
         }
     }
     let read = parts.iter().map(|t| t.recording(machine)).collect::<Result<Vec<_>>>()?;
-    let Ok((calibrated, fit)) = calibrate(machine, &read, CalibrateOptions::default()) else { return Ok(None) };
+    let Ok((calibrated, fit)) = calibrate(machine, &read, CalibrateOptions::default()) else {
+        return Ok(None);
+    };
     let name = |t: &Thinned| t.name();
     let of_setup: Vec<String> = rows.thinned.iter().filter(|t| t.header.setup == setup).map(name).collect();
     let mut best: Option<(&Plausibility, f64)> = None;
     for left in rows.plausibility.iter().filter(|p| of_setup.contains(&p.recording)) {
-        let same = |p: &&Plausibility| p.of_angles == left.of_angles && p.recording.starts_with(&left.recording);
+        let same =
+            |p: &&Plausibility| p.of_angles == left.of_angles && p.recording.starts_with(&left.recording);
         let own = fit.plausibility.iter().filter(same).map(|p| p.left);
         let Some(then) = own.max_by(f64::total_cmp) else { continue };
-        if then < MOSTLY_THE_STEP * left.left && best.is_none_or(|(of, least)| then / left.left < least / of.left) {
+        if then < MOSTLY_THE_STEP * left.left
+            && best.is_none_or(|(of, least)| then / left.left < least / of.left)
+        {
             best = Some((left, then));
         }
     }

@@ -92,7 +92,8 @@ impl Other {
         let one = |thinned: &Thinned| {
             let mut other = thinned.clone();
             other.head.retain(|line| !line.trim_start_matches('#').trim_start().starts_with("machine"));
-            let turned = |s: &Sample| Sample { commands: from.iter().map(|c| s.commands[*c]).collect(), ..s.clone() };
+            let turned =
+                |s: &Sample| Sample { commands: from.iter().map(|c| s.commands[*c]).collect(), ..s.clone() };
             other.samples = thinned.samples.iter().map(turned).collect();
             other.recording(&self.machine)
         };

@@ -19,6 +19,8 @@ pub(super) struct Seen {
     pub residuals: Vec<f64>,
     /// By reading, how it answers to a small twist of frame `w`, m and rad.
     pub by_frame: Vec<[f64; 6]>,
+    /// By command, its way from the row before, m or rad, or that a second where the recording has a clock.
+    pub way: Vec<f64>,
     /// By reading, how it answers to each command, per m or rad.
     pub by_command: Vec<Vec<f64>>,
 }
@@ -44,13 +46,17 @@ impl Rows {
             let count = source.sensor.reading_count();
             let mut rows = vec![0.0; count * width];
             let first = seen.len();
-            for (place, sample) in thinned[index].samples.iter().enumerate() {
+            let before = thinned[index].neighbours(-1);
+            for (place, (sample, before)) in thinned[index].samples.iter().zip(before).enumerate() {
+                let since = sample.time.zip(before.time).map_or(1.0, |(now, then)| now - then);
+                let ways = sample.commands.iter().zip(&before.commands);
                 let (q, values) = (&sample.commands, &sample.values);
                 let residuals = evaluator.residuals(q, values, Moment::Still, &mut work, Some(&mut rows));
                 let row = |i: usize| &rows[i * width..i * width + 6 * dyads];
                 seen.push(Seen {
                     recording: index,
                     place,
+                    way: ways.map(|(q, before)| (q - before) / since.max(f64::MIN_POSITIVE)).collect(),
                     residuals: residuals[..count].to_vec(),
                     by_frame: (0..count).map(|i| std::array::from_fn(|k| row(i)[6 * w + k])).collect(),
                     by_command: (0..count).map(|i| by_commands(machine, row(i))).collect(),

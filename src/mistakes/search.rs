@@ -123,7 +123,11 @@ struct Trial<'a> {
 }
 
 /// The recordings without these mistakes.
-pub(super) fn without(machine: &Machine, thinned: &[Thinned], mistakes: &[&Change]) -> Result<Vec<Recording>> {
+pub(super) fn without(
+    machine: &Machine,
+    thinned: &[Thinned],
+    mistakes: &[&Change],
+) -> Result<Vec<Recording>> {
     let one = |thinned: &Thinned| {
         let mut other = thinned.clone();
         for change in mistakes {
@@ -166,17 +170,25 @@ impl Trial<'_> {
             let recordings = other.recordings(self.machine, self.thinned).ok()?;
             Some(self.excess(&as_declared(&other.machine, &recordings).ok()?))
         };
-        let best = |other: &Other| excess(other).filter(|own| *own <= 1.0 && ALIKE * own <= self.left.excess());
-        let mut found: Vec<(f64, &Other)> =
-            others.iter().filter_map(|o| Some((best(o)?, o))).filter(|(own, _)| *own <= ALIKE * least).collect();
+        let best =
+            |other: &Other| excess(other).filter(|own| *own <= 1.0 && ALIKE * own <= self.left.excess());
+        let mut found: Vec<(f64, &Other)> = others
+            .iter()
+            .filter_map(|o| Some((best(o)?, o)))
+            .filter(|(own, _)| *own <= ALIKE * least)
+            .collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         if found.first().is_some_and(|(own, _)| ALIKE * own < least) {
             mistakes.clear();
         }
         for (_, other) in found.iter().take(MOST.saturating_sub(mistakes.len())) {
             let recordings = other.recordings(self.machine, self.thinned)?;
-            let Ok((_, fit)) = calibrate(&other.machine, &recordings, CalibrateOptions::default()) else { continue };
-            let same = |p: &&Plausibility| (&p.recording, p.of_angles) == (&self.left.recording, self.left.of_angles);
+            let Ok((_, fit)) = calibrate(&other.machine, &recordings, CalibrateOptions::default()) else {
+                continue;
+            };
+            let same = |p: &&Plausibility| {
+                (&p.recording, p.of_angles) == (&self.left.recording, self.left.of_angles)
+            };
             if let Some(own) = fit.plausibility.iter().find(same) {
                 mistakes.push(Mistake { what: other.what.clone(), mend: other.mend.clone(), left: own.left });
             }
@@ -189,7 +201,9 @@ impl Trial<'_> {
         let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
         let mut alike: Vec<_> = scored.iter().take_while(|(excess, _)| *excess <= ALIKE * least).collect();
         // What leaves more of the target open explains no less.
-        let one_is_enough = alike.iter().any(|(_, own)| matches!(own[..], [Change::Target { place, rotation }] if place != rotation));
+        let one_is_enough = alike
+            .iter()
+            .any(|(_, own)| matches!(own[..], [Change::Target { place, rotation }] if place != rotation));
         let open = |change: &&Change| matches!(change, Change::Target { place: true, rotation: true });
         alike.retain(|(_, own)| !(one_is_enough && own.iter().any(open)));
         let better = least <= 1.0 && ALIKE * least <= self.left.excess();

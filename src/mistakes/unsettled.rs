@@ -47,7 +47,8 @@ pub(super) fn unsettled(machine: &Machine, rows: &Rows) -> Result<Option<Unsettl
     let used: Vec<usize> = (0..commands)
         .filter(|c| {
             let range = all(*c).fold(f64::NEG_INFINITY, f64::max) - all(*c).fold(f64::INFINITY, f64::min);
-            let mut steps: Vec<f64> = (rows.seen.iter().map(|s| moved(s.recording, s.place, *c).abs())).collect();
+            let mut steps: Vec<f64> =
+                (rows.seen.iter().map(|s| moved(s.recording, s.place, *c).abs())).collect();
             steps.sort_by(f64::total_cmp);
             steps.get(steps.len() / 2).is_some_and(|step| *step > APART * range && range > 0.0)
         })

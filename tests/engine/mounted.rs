@@ -114,7 +114,7 @@ fn an_instrument_that_was_moved_is_told_with_its_line() {
         let moved = odd(&machine, &[recording], &|_| {}).expect("read").moved.expect("moved");
         // Three lines stand above the first sample.
         assert!(moved.line.abs_diff(3 + 70 + 1) <= 1, "{moved:?}");
-        assert!((moved.by_m - 1.044 * way).abs() < 0.2 * way && moved.then < 2.0 * NOISE.0, "{moved:?}");
+        assert!((moved.by_m - 1.044 * way).abs() < 0.2 * way && moved.then < 2.6 * NOISE.0, "{moved:?}");
     }
 }
 
@@ -126,7 +126,8 @@ fn an_instrument_that_creeps_was_not_moved() {
     let before = anywhere(&mut random, 2.0);
     // Evenly, and as something that gets warm.
     for course in [|s: f64| s, |s: f64| 1.0 - (-4.0 * s).exp()] {
-        let instrument = |k: usize| before * Pose::translation(Vec3([0.003 * course(k as f64 / 120.0), 0.0, 0.0]));
+        let instrument =
+            |k: usize| before * Pose::translation(Vec3([0.003 * course(k as f64 / 120.0), 0.0, 0.0]));
         let poses = read(&machine, &commands, instrument, Pose::identity(0.0), &mut random);
         let head = arrays(&machine, &commands, &poses).unknown_workpiece_frame();
         let recording = head.recording("r.csv", &machine).expect("a recording");

@@ -55,7 +55,8 @@ impl Kalman {
                     None => {
                         let known = self.known.as_ref();
                         let known = known.and_then(|k| k.tool_rotations.iter().find(|p| p.0 == *name));
-                        let start = known.ok_or_else(|| no_start(&format!("the rotation of target \"{name}\"")))?.1;
+                        let start =
+                            known.ok_or_else(|| no_start(&format!("the rotation of target \"{name}\"")))?.1;
                         self.values.tool_rotations.push((name.clone(), start));
                         let i = self.values.tool_rotations.len() - 1;
                         self.grow(Role::ToolRotation(i), vec![rotation; 3]);
