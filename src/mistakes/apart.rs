@@ -1,11 +1,9 @@
 //! A set-up that agrees with the machine, but not with the other set-ups.
 
-use serde::{Deserialize, Serialize};
-
 use super::Change;
 use super::list::targets;
-use super::search::{Mistake, Nonsense, without};
-use super::thinned::Thinned;
+use super::nonsense::{Apart, Mistake, Nonsense};
+use super::thinned::{Thinned, without};
 use crate::error::Result;
 use crate::identify::{CalibrateOptions, Fit, Plausibility, calibrate};
 use crate::machine::Machine;
@@ -16,16 +14,6 @@ use crate::recording::Recording;
 const CONTRADICTS: f64 = 100.0;
 /// What explains a set-up leaves no more than this many times what the set-up leaves alone.
 const ALIKE: f64 = 5.0;
-
-/// What is left of a set-up alone.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Apart {
-    /// Its name; empty for the default one.
-    pub setup: String,
-    /// What is left of the same readings where only recordings of this set-up are calibrated on, without tolerances, m or rad.
-    pub alone: f64,
-}
 
 /// Looks for a set-up that contradicts the others, and for what of it is not what its recordings say.
 pub(super) fn search(

@@ -1,13 +1,13 @@
 //! Which mistake explains that a machine and recordings do not belong together.
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use super::Change;
-use super::apart::{self, Apart};
+use super::apart;
 use super::list::{TRIED, changes};
+use super::nonsense::{Mistake, Nonsense};
 use super::others::{Other, others};
-use super::thinned::Thinned;
+use super::thinned::{Thinned, without};
 use crate::error::Result;
 use crate::identify::{CalibrateOptions, Fit, Plausibility, as_declared, calibrate, worst};
 use crate::machine::Machine;
@@ -20,35 +20,6 @@ const ALIKE: f64 = 5.0;
 const BEGUN: usize = 12;
 /// More that cannot be told apart are no name.
 const MOST: usize = 4;
-
-/// What is wrong with a calibration that is nonsense.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Nonsense {
-    /// The worst of what is left over.
-    pub left: Plausibility,
-    /// Where one set-up does not agree with the others.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub apart: Option<Apart>,
-    /// The mistakes that would explain it, best first; several where the recordings do not tell them apart.
-    pub mistakes: Vec<Mistake>,
-    /// How many were tried, and what.
-    pub tried: usize,
-    /// The kinds that were tried.
-    pub kinds: String,
-}
-
-/// A mistake that would explain recordings.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Mistake {
-    /// Which, as the part of a sentence that follows "with".
-    pub what: String,
-    /// What to do about it.
-    pub mend: String,
-    /// What would be left without it, of the same recording and quantity as [`Nonsense::left`], m or rad.
-    pub left: f64,
-}
 
 /// Calibrates thinned recordings; if the result is nonsense, looks for the mistake.
 ///
@@ -120,22 +91,6 @@ struct Trial<'a> {
     /// Of the recordings as they are, and the worst of it.
     fit: &'a Fit,
     left: &'a Plausibility,
-}
-
-/// The recordings without these mistakes.
-pub(super) fn without(
-    machine: &Machine,
-    thinned: &[Thinned],
-    mistakes: &[&Change],
-) -> Result<Vec<Recording>> {
-    let one = |thinned: &Thinned| {
-        let mut other = thinned.clone();
-        for change in mistakes {
-            (other.samples, other.head) = (change.applied(&other), change.head(&other));
-        }
-        other.recording(machine)
-    };
-    thinned.iter().map(one).collect()
 }
 
 impl Trial<'_> {

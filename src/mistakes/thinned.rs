@@ -149,3 +149,19 @@ impl Thinned {
         Recording::from_bytes(&self.path, text.into_bytes(), machine)
     }
 }
+
+/// The recordings without these mistakes.
+pub(super) fn without(
+    machine: &Machine,
+    thinned: &[Thinned],
+    mistakes: &[&Change],
+) -> Result<Vec<Recording>> {
+    let one = |thinned: &Thinned| {
+        let mut other = thinned.clone();
+        for change in mistakes {
+            (other.samples, other.head) = (change.applied(&other), change.head(&other));
+        }
+        other.recording(machine)
+    };
+    thinned.iter().map(one).collect()
+}

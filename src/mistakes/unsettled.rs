@@ -6,8 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::Change;
 use super::rows::Rows;
-use super::search::without;
-use super::thinned::Thinned;
+use super::thinned::{Thinned, without};
 use crate::error::Result;
 use crate::identify::{CalibrateOptions, Plausibility, calibrate};
 use crate::machine::Machine;
