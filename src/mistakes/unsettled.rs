@@ -2,7 +2,6 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::Change;
 use super::rows::Rows;
@@ -14,8 +13,6 @@ use crate::machine::Machine;
 /// Neighbours on a path are far less than this part of the range apart, poses one by one more: a tenth lies between. On a path it would be
 /// a lag, which `diagnose` tells from its like.
 const APART: f64 = 0.1;
-/// It is tried in earnest where one recording in a hundred would show as much by chance.
-const BY_CHANCE: f64 = 0.01;
 /// It must leave less than this part of what is left: three quarters of it were due to this.
 const MOSTLY: f64 = 0.5;
 
@@ -56,7 +53,7 @@ pub(super) fn unsettled(machine: &Machine, rows: &Rows) -> Result<Option<Unsettl
         return Ok(None);
     }
     let (mut matrix, mut gradient) = (DMatrix::zeros(used.len(), used.len()), DVector::zeros(used.len()));
-    let (mut squares, mut readings) = (0.0, 0);
+    let mut squares = 0.0;
     for seen in &rows.seen {
         for (row, residual) in seen.by_command.iter().zip(&seen.residuals) {
             let row = DVector::from_iterator(
@@ -66,13 +63,11 @@ pub(super) fn unsettled(machine: &Machine, rows: &Rows) -> Result<Option<Unsettl
             matrix.ger(1.0, &row, &row, 1.0);
             gradient.axpy(*residual, &row, 1.0);
             squares += residual * residual;
-            readings += 1;
         }
     }
     let Some(solved) = Cholesky::new(matrix).map(|c| c.solve(&gradient)) else { return Ok(None) };
     let gain = solved.dot(&gradient);
-    let chance = ChiSquared::new(used.len() as f64).map_or(f64::INFINITY, |d| d.inverse_cdf(1.0 - BY_CHANCE));
-    if gain * readings as f64 <= chance * (squares - gain) {
+    if squares - gain > MOSTLY * MOSTLY * squares {
         return Ok(None);
     }
     let mut parts = vec![0.0; commands];
