@@ -51,24 +51,24 @@ fn arrays(machine: &Machine, commands: &[Vec<f64>], poses: &[Pose<f64>]) -> Arra
     joints.fold(Arrays::pose(poses), |arrays, (c, joint)| arrays.command(joint, &column(c)))
 }
 
-/// Three set-ups of an arm, target and instrument each time elsewhere; `declared`: what their heads say of it.
-fn set_ups(machine: &Machine, declared: impl Fn(Arrays, &str) -> Arrays) -> Vec<Recording> {
+/// Set-ups of an arm, target and instrument each time elsewhere; `declared`: what their heads say of it.
+fn set_ups(machine: &Machine, count: usize, declared: impl Fn(Arrays, &str) -> Arrays) -> Vec<Recording> {
     let mut random = Random::new(3);
     let one = |i: usize| {
-        let commands = random_commands(machine, 60, 10 + i as u64);
+        let commands = random_commands(machine, 50, 10 + i as u64);
         let (instrument, target) = (anywhere(&mut random, 2.0), anywhere(&mut random, 0.1));
         let poses = read(machine, &commands, |_| instrument, target, &mut random);
         let name = format!("s{i}");
         let head = arrays(machine, &commands, &poses).set_up(&name).unknown_workpiece_frame();
         declared(head, &name).recording(&format!("{name}.csv"), machine).expect("a recording")
     };
-    (0..3).map(one).collect()
+    (0..count).map(one).collect()
 }
 
 #[test]
 fn targets_mounted_anew_leave_the_noise() {
     let machine = machine("ur10");
-    let all = set_ups(&machine, |head, name| head.unknown_tool_point(name).unknown_tool_rotation(name));
+    let all = set_ups(&machine, 3, |head, name| head.unknown_tool_point(name).unknown_tool_rotation(name));
     let (calibrated, fit) = calibrate(&machine, &all, CalibrateOptions::default()).expect("a fit");
     let (m, rad) = (fit.rms.m.expect("m").geometric, fit.rms.rad.expect("rad").geometric);
     // Norms of three components, less what the fit has used up.
@@ -85,11 +85,11 @@ fn targets_mounted_anew_leave_the_noise() {
 #[test]
 fn what_is_new_in_every_set_up_is_named() {
     let machine = machine("ur10");
-    let all = set_ups(&machine, |head, _| head);
+    let all = set_ups(&machine, 2, |head, _| head);
     let said = nonsense(&machine, &all, &|_| {}).expect("read").expect("nonsense");
     let told: Vec<&str> = said.mistakes.iter().map(|m| m.what.as_str()).collect();
     assert_eq!(told, ["place and rotation of the target unknown, one for each set-up,"]);
-    let all = set_ups(&machine, |head, name| head.unknown_tool_rotation(name));
+    let all = set_ups(&machine, 2, |head, name| head.unknown_tool_rotation(name));
     let said = nonsense(&machine, &all, &|_| {}).expect("read").expect("nonsense");
     let apart = said.apart.expect("a set-up that contradicts the others");
     assert!(apart.alone < 2.0 * NOISE.0 && said.left.left > 1000.0 * apart.alone, "{apart:?}");
@@ -195,4 +195,44 @@ fn whole_turns_are_no_extrapolation() {
     let mut q = vec![0.0; 6];
     q[1] = to + 0.3;
     assert!(calibrated.extrapolates(&q));
+}
+
+#[test]
+fn another_machine_and_exchanged_branches_are_named() {
+    let arm = machine("ur10");
+    let mut random = Random::new(12);
+    let commands = random_commands(&arm, 60, 12);
+    let poses = read(
+        &arm,
+        &commands,
+        |_| Pose::identity(0.0),
+        Pose::translation(Vec3([0.04, 0.03, 0.1])),
+        &mut random,
+    );
+    let points: Vec<[f64; 3]> = poses.iter().map(|pose| pose.translation.0).collect();
+    let told = |given: &Machine| -> Vec<String> {
+        let columns = commands_by_joint(&arm, &commands);
+        let all = columns.iter().fold(Arrays::position(&points), |all, (joint, q)| all.command(joint, q));
+        let all = all.tool_point(Vec3([0.04, 0.03, 0.1])).recording("r.csv", given).expect("a recording");
+        let said = nonsense(given, &[all], &|_| {}).expect("read").expect("nonsense");
+        said.mistakes.iter().map(|m| m.what.clone()).collect()
+    };
+    assert_eq!(told(&machine("puma560")), ["machine ur10"]);
+    let text =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/machines/ur10.ron")).expect("the file");
+    let text = text
+        .replace("\"ur10\"", "\"arm\"")
+        .replace("\"w\"", "\"?\"")
+        .replace("\"t\"", "\"w\"")
+        .replace("\"?\"", "\"t\"");
+    let text = text.replace("workpiece: [", "?").replace("tool: [", "workpiece: [").replace('?', "tool: [");
+    let exchanged = Machine::parse("arm.ron", &text).unwrap_or_else(|e| panic!("{e}"));
+    let mut named = told(&exchanged);
+    named.sort();
+    assert_eq!(named, ["machine ur10", "the branches exchanged"]);
+}
+
+fn commands_by_joint<'a>(machine: &'a Machine, commands: &[Vec<f64>]) -> Vec<(&'a str, Vec<f64>)> {
+    let joints = machine.commands().iter().enumerate();
+    joints.map(|(c, joint)| (joint.as_str(), commands.iter().map(|q| q[c]).collect())).collect()
 }
