@@ -51,7 +51,7 @@ pub(super) fn left_out(
     let meaningless: Vec<DMatrix<f64>> = placebos.iter().flatten().map(|p| p.raw.clone()).collect();
     let (Some(effects), true) = (effects, says(search, &names)) else { return Vec::new() };
     let left =
-        |effects: &[DMatrix<f64>]| SetUps::new(search, &names, effects).as_calibrated(search).left(search);
+        |effects: &[DMatrix<f64>]| SetUps::new(search, &names, effects).with_tolerances(search).left(search);
     let (geometric, with_all) = (left(&[]), left(&effects));
     let instead = (!meaningless.is_empty()).then(|| left(&meaningless));
     let one = |name: &String| {
@@ -157,7 +157,7 @@ impl SetUps {
 
     /// With what `calibrate` knows beforehand, of deviations their tolerances and that they lie about zero: rows are taken at the optimum of
     /// all set-ups, and would keep what the one that is left out has told.
-    fn as_calibrated(mut self, search: &Search) -> Self {
+    fn with_tolerances(mut self, search: &Search) -> Self {
         for (column, (information, at)) in search.rows.linear.tolerated().into_iter().enumerate() {
             if let Some(information) = information {
                 (self.before.0[column], self.before.1[column]) = (information, information * at);

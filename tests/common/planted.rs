@@ -313,7 +313,7 @@ pub fn random_machine(random: &mut Random) -> Machine {
 pub fn drawn(draw: u64) -> Result<(), String> {
     let mut random = Random::new(draw);
     let machine = random_machine(&mut random);
-    let sensor = if draw % 2 == 0 { Sensor::Position } else { Sensor::Pose };
+    let sensor = if draw.is_multiple_of(2) { Sensor::Position } else { Sensor::Pose };
     let size = 30f64.powf(random.between(0.0, 1.0));
     let text = text(&machine, &Instrument::new(sensor.clone(), 1e-6, 5e-6), size, 120, draw);
     let (_, fit) = calibrate(&machine, &[read(&text, &machine)], CalibrateOptions::default())
