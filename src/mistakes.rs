@@ -14,6 +14,7 @@ mod others;
 mod rows;
 mod search;
 mod thinned;
+mod undone;
 mod unsettled;
 
 pub use change::Change;

@@ -1,9 +1,10 @@
 //! A set-up that agrees with the machine, but not with the other set-ups.
 
-use super::Change;
+use super::change::Change;
 use super::list::targets;
 use super::nonsense::{Apart, Mistake, Nonsense};
-use super::thinned::{Thinned, without};
+use super::thinned::Thinned;
+use super::undone::without;
 use crate::error::Result;
 use crate::identify::{CalibrateOptions, Fit, Plausibility, calibrate};
 use crate::machine::Machine;

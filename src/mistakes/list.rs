@@ -2,8 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::Change;
-use super::change::turns;
+use super::change::{Change, turns};
 use super::thinned::{SHIFTS, Thinned};
 use crate::machine::Machine;
 use crate::recording::{Header, Measurement, ToolPoint};

@@ -2,12 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::Change;
 use super::apart;
+use super::change::Change;
 use super::list::{TRIED, changes};
 use super::nonsense::{Mistake, Nonsense};
 use super::others::{Other, others};
-use super::thinned::{Thinned, without};
+use super::thinned::Thinned;
+use super::undone::without;
 use crate::error::Result;
 use crate::identify::{CalibrateOptions, Fit, Plausibility, as_declared, calibrate, worst};
 use crate::machine::Machine;

@@ -3,7 +3,6 @@
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
-use super::Change;
 use crate::error::Result;
 use crate::machine::{JointKind, Machine};
 use crate::recording::{Header, Measurement, Recording, Role};
@@ -38,7 +37,7 @@ pub(super) struct Thinned {
     pub units: Vec<Option<Unit>>,
     pub value_units: Vec<Unit>,
     /// By place in the thinned recording: the sample in the middle and `SHIFTS` neighbours on each side.
-    windows: Vec<Vec<Sample>>,
+    pub windows: Vec<Vec<Sample>>,
     /// The samples that a change works on.
     pub samples: Vec<Sample>,
 }
@@ -105,17 +104,6 @@ impl Thinned {
         self.neighbours(-1).map(|sample| sample.commands.clone()).collect()
     }
 
-    /// The samples of some places as a recording of its own, in a set-up whose frame `w` is unknown.
-    pub fn part(&self, from: usize, to: usize, setup: &str) -> Thinned {
-        let mut part = Change::Frame.applied_to_head(self);
-        part.head.retain(|line| !line.trim_start_matches('#').trim_start().starts_with("setup"));
-        part.head.push(format!("# setup: {setup}"));
-        part.path = format!("{} {}", self.path, setup.replace(['/', '\\'], " "));
-        part.header.setup = setup.into();
-        (part.samples, part.windows) = (self.samples[from..to].to_vec(), self.windows[from..to].to_vec());
-        part
-    }
-
     /// As a recording again, m and rad.
     pub fn recording(&self, machine: &Machine) -> Result<Recording> {
         let kind = |kind| if kind == JointKind::Revolute { "rad" } else { "m" };
@@ -148,20 +136,4 @@ impl Thinned {
         }
         Recording::from_bytes(&self.path, text.into_bytes(), machine)
     }
-}
-
-/// The recordings without these mistakes.
-pub(super) fn without(
-    machine: &Machine,
-    thinned: &[Thinned],
-    mistakes: &[&Change],
-) -> Result<Vec<Recording>> {
-    let one = |thinned: &Thinned| {
-        let mut other = thinned.clone();
-        for change in mistakes {
-            (other.samples, other.head) = (change.applied(&other), change.head(&other));
-        }
-        other.recording(machine)
-    };
-    thinned.iter().map(one).collect()
 }

@@ -3,9 +3,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use super::Change;
+use super::change::Change;
 use super::rows::Rows;
-use super::thinned::{Thinned, without};
+use super::thinned::Thinned;
+use super::undone::without;
 use crate::error::Result;
 use crate::identify::{CalibrateOptions, Plausibility, calibrate};
 use crate::machine::Machine;

@@ -83,12 +83,18 @@ fn targets_mounted_anew_leave_the_noise() {
 }
 
 #[test]
-fn what_is_new_in_every_set_up_is_named() {
+#[ignore = "long: every mistake is tried on the poses of two set-ups"]
+fn a_target_that_is_turned_anew_in_every_set_up_is_named() {
     let machine = machine("ur10");
     let all = set_ups(&machine, 2, |head, _| head);
     let said = nonsense(&machine, &all, &|_| {}).expect("read").expect("nonsense");
     let told: Vec<&str> = said.mistakes.iter().map(|m| m.what.as_str()).collect();
     assert_eq!(told, ["place and rotation of the target unknown, one for each set-up,"]);
+}
+
+#[test]
+fn a_set_up_that_contradicts_the_others_is_told_and_what_is_new_in_it() {
+    let machine = machine("ur10");
     let all = set_ups(&machine, 2, |head, name| head.unknown_tool_rotation(name));
     let said = nonsense(&machine, &all, &|_| {}).expect("read").expect("nonsense");
     let apart = said.apart.expect("a set-up that contradicts the others");
