@@ -12,7 +12,7 @@ use crate::document::Document;
 use crate::effects::StoredEffect;
 use crate::error::Result;
 use crate::error_motion::{self, MotionForm};
-use crate::lie::{Pose, Twist, Vec3};
+use crate::lie::{Mat3, Pose, Twist, Vec3};
 use crate::machine::{
     Checked, JointKind, Machine, MachineFault, MachineForm, OF_CALIBRATION, Placement, Triple, at_path,
     in_unit, number, to_text, vec_to_si,
@@ -44,6 +44,8 @@ pub(crate) struct CalibrationForm {
     setups: Vec<PlaceForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     tool_points: Vec<PointForm>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    tool_rotations: Vec<RotationForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     zeros: Vec<ZeroForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -88,6 +90,13 @@ struct PointForm {
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "tool_rotation", deny_unknown_fields)]
+struct RotationForm {
+    name: String,
+    rotation: Triple,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename = "zero", deny_unknown_fields)]
 struct ZeroForm {
     setup: String,
@@ -118,6 +127,8 @@ pub struct CalibratedMachine {
     /// Frame `w` in the frame before it, by set-up.
     pub(crate) setups: Vec<(String, Pose<f64>)>,
     pub(crate) tool_points: Vec<(String, Vec3<f64>)>,
+    /// Of targets in frame `t`.
+    pub(crate) tool_rotations: Vec<(String, Mat3<f64>)>,
     /// Set-up, channel, value.
     pub(crate) zeros: Vec<(String, String, f64)>,
     pub(crate) lengths: Vec<(String, f64)>,
@@ -142,6 +153,7 @@ impl CalibratedMachine {
             deviations: vec![Twist::zero(0.0); dyads],
             setups: Vec::new(),
             tool_points: Vec::new(),
+            tool_rotations: Vec::new(),
             zeros: Vec::new(),
             lengths: Vec::new(),
             seen: vec![None; commands],
@@ -218,6 +230,11 @@ impl CalibratedMachine {
         self.tool_points.iter().map(|(name, at)| (name.as_str(), *at))
     }
 
+    /// Rotations of targets in frame `t` that were found, by name, as rotation vectors, rad.
+    pub fn tool_rotations(&self) -> impl Iterator<Item = (&str, Vec3<f64>)> {
+        self.tool_rotations.iter().map(|(name, rotation)| (name.as_str(), rotation_vector(*rotation)))
+    }
+
     /// Zeros that were found: set-up, joint or direction that they belong to, value in m or rad.
     pub fn zeros(&self) -> impl Iterator<Item = (&str, &str, f64)> {
         self.zeros.iter().map(|(setup, of, value)| (setup.as_str(), of.as_str(), *value))
@@ -251,12 +268,37 @@ impl CalibratedMachine {
 
     /// Whether a vector of commands leaves what the calibration has seen by more than 1 % of the range of any joint.
     pub fn extrapolates(&self, commands: &[f64]) -> bool {
-        commands.iter().zip(&self.seen).any(|(q, seen)| {
-            seen.is_some_and(|(from, to)| {
-                let slack = 0.01 * (to - from) + 1e-9;
-                *q < from - slack || *q > to + slack
-            })
-        })
+        (0..self.seen.len().min(commands.len())).any(|c| self.beyond(c, commands[c]).is_some())
+    }
+
+    /// By how much a command lies beyond the range that the calibration has seen, m or rad, if by more than 1 % of that range. Whole turns
+    /// do not count where the machine is the same after them.
+    ///
+    /// `command`: index in [`Machine::commands`]; `q`: m or rad.
+    pub fn beyond(&self, command: usize, q: f64) -> Option<f64> {
+        let (from, to) = self.seen.get(command).copied().flatten()?;
+        let slack = 0.01 * (to - from) + 1e-9;
+        let outside = |q: f64| (from - q).max(q - to);
+        let mut beyond = outside(q);
+        if beyond > slack && self.repeats(command) {
+            // The copy of the command next above the range, and the one below that.
+            let above = from + (q - from).rem_euclid(TAU);
+            beyond = outside(above).min(outside(above - TAU));
+        }
+        (beyond > slack).then_some(beyond)
+    }
+
+    /// Whether the model is the same after a whole turn of a command: it moves revolute joints alone, each by whole turns, and no
+    /// deviation depends on where they stand.
+    fn repeats(&self, command: usize) -> bool {
+        let variation = &self.variation;
+        let machine = &self.machine;
+        let whole = |(j, joint): (usize, &crate::machine::Joint)| {
+            let terms = machine.drive(j).map_or(&[][..], |drive| &drive.terms);
+            let mut own = terms.iter().filter(|(c, factor)| *c == command && *factor != 0.0);
+            own.all(|(_, factor)| joint.kind == JointKind::Revolute && factor.fract() == 0.0)
+        };
+        variation.varying.terms.is_empty() && variation.motions.is_empty() && machine.joints().all(whole)
     }
 
     /// The commands nearest to these that the calibration has seen, m or rad; those of turning joints may be whole turns away.
@@ -320,6 +362,11 @@ impl CalibratedMachine {
         for (i, point) in form.tool_points.iter().enumerate() {
             let at = place(&format!("calibration.tool_points[{i}].at"), point.at, units.length)?;
             self.tool_points.push((point.name.clone(), at));
+        }
+        for (i, target) in form.tool_rotations.iter().enumerate() {
+            let path = format!("calibration.tool_rotations[{i}].rotation");
+            let turn = Twist::new(Vec3([0.0; 3]), place(&path, target.rotation, units.angle)?);
+            self.tool_rotations.push((target.name.clone(), Pose::exp(turn).rotation));
         }
         for (i, zero) in form.zeros.iter().enumerate() {
             checked(format!("calibration.zeros[{i}].value"), zero.value)?;
@@ -391,6 +438,12 @@ impl CalibratedMachine {
             tool_points: (self.tool_points.iter())
                 .map(|(name, at)| PointForm { name: name.clone(), at: in_unit(*at, units.length) })
                 .collect(),
+            tool_rotations: (self.tool_rotations.iter())
+                .map(|(name, rotation)| RotationForm {
+                    name: name.clone(),
+                    rotation: in_unit(rotation_vector(*rotation), units.angle),
+                })
+                .collect(),
             zeros: (self.zeros.iter())
                 .map(|(setup, of, value)| ZeroForm {
                     setup: setup.clone(),
@@ -459,6 +512,10 @@ pub(crate) fn deviation_forms(machine: &Machine, deviations: &[Twist<f64>]) -> V
             w: in_unit(dh.w, units.angle),
         })
         .collect()
+}
+
+fn rotation_vector(rotation: Mat3<f64>) -> Vec3<f64> {
+    Pose { rotation, translation: Vec3([0.0; 3]) }.rotation_vector()
 }
 
 fn checked(path: String, value: f64) -> Checked<f64> {

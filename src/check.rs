@@ -113,14 +113,21 @@ fn random_twist(tolerance: [f64; 6], size: f64, rng: &mut StdRng) -> Twist<f64> 
 impl<'a> Case<'a> {
     fn random(machine: &'a Machine, sensor: &'a Sensor, size: f64, rng: &mut StdRng) -> Self {
         let mut point = |reach: f64| Vec3(std::array::from_fn(|_| rng.random_range(-reach..reach)));
-        let state =
-            SensorState { tool_point_t: point(0.1), workpiece_point_w: point(0.1), length: 0.1, zero: 0.01 };
+        let turn = |rotation: Vec3<f64>| Pose::exp(Twist::new(Vec3([0.0; 3]), rotation)).rotation;
+        let state = SensorState {
+            tool_point_t: point(0.1),
+            workpiece_point_w: point(0.1),
+            tool_rotation_t: turn(point(2.0)),
+            length: 0.1,
+            zero: 0.01,
+        };
         let q: Vec<f64> = (0..machine.commands().len()).map(|c| random_command(machine, c, rng)).collect();
         let tolerance = [2e-5, 2e-5, 2e-5, 5e-5, 5e-5, 5e-5];
         let deviations: Vec<_> = machine.dyads().iter().map(|_| random_twist(tolerance, size, rng)).collect();
         // The measured pose lies near the modelled one, exactly on it where every deviation is zero.
         let near = Pose::exp(random_twist(tolerance, size, rng));
-        let measured = near * Chain::new(machine, &deviations).w_from_t(&q);
+        let target = Pose { rotation: state.tool_rotation_t, translation: Vec3([0.0; 3]) };
+        let measured = near * Chain::new(machine, &deviations).w_from_t(&q) * target;
         Case { machine, sensor, deviations, q, state, measured }
     }
 
@@ -145,7 +152,7 @@ impl<'a> Case<'a> {
         readings.map(|reading| reading.value)
     }
 
-    /// Worst relative difference by deviations, commands and tool point.
+    /// Worst relative difference by deviations, commands, and place and turn of the tool.
     fn differences(&self) -> [f64; 3] {
         let rows = self.sensor.reading_count();
         let dyads = self.machine.dyads().len();
@@ -187,14 +194,21 @@ impl<'a> Case<'a> {
                 dual_commands[(i, c)] = value.eps;
             }
         }
-        let mut dual_point = DMatrix::zeros(rows, 3);
+        let mut dual_point = DMatrix::zeros(rows, 6);
         for k in 0..3 {
             let q: Vec<Dual64> = self.q.iter().map(|x| Dual64::from(*x)).collect();
             let mut state = lift(&self.state, constant);
             state.tool_point_t.0[k] = state.tool_point_t.0[k].derivative();
             let values = self.readings(&deviations, &q, &state);
-            for (i, value) in values.iter().take(rows).enumerate() {
-                dual_point[(i, k)] = value.eps;
+            let mut turn = Vec3([constant; 3]);
+            turn.0[k] = turn.0[k].derivative();
+            let mut turned = lift(&self.state, constant);
+            let turn = Pose::exp(Twist::new(Vec3([constant; 3]), turn));
+            turned.tool_rotation_t = turned.tool_rotation_t * turn.rotation;
+            let values_turned = self.readings(&deviations, &q, &turned);
+            for i in 0..rows {
+                dual_point[(i, k)] = values[i].eps;
+                dual_point[(i, 3 + k)] = values_turned[i].eps;
             }
         }
         [
@@ -208,7 +222,7 @@ impl<'a> Case<'a> {
         let dyads = self.machine.dyads().len();
         let mut by_deviations = DMatrix::zeros(rows, 6 * dyads);
         let mut by_commands = DMatrix::zeros(rows, self.q.len());
-        let mut by_point = DMatrix::zeros(rows, 3);
+        let mut by_point = DMatrix::zeros(rows, 6);
         if let Sensor::Joint { dyad } = *self.sensor {
             let joint = self.machine.dyads()[dyad].joint.as_ref().expect("a joint");
             for (k, x) in joint.twist().to_array().into_iter().enumerate() {
@@ -238,6 +252,9 @@ impl<'a> Case<'a> {
             for (k, x) in reading.by_tool_point_t.0.into_iter().enumerate() {
                 by_point[(i, k)] = x;
             }
+            for (k, x) in reading.by_tool_rotation.0.into_iter().enumerate() {
+                by_point[(i, 3 + k)] = x;
+            }
         }
         (by_deviations, by_commands, by_point)
     }
@@ -246,6 +263,7 @@ impl<'a> Case<'a> {
 fn lift<S: crate::scalar::Scalar>(state: &SensorState<f64>, like: S) -> SensorState<S> {
     SensorState {
         tool_point_t: state.tool_point_t.lift(like),
+        tool_rotation_t: state.tool_rotation_t.lift(like),
         workpiece_point_w: state.workpiece_point_w.lift(like),
         length: like.lift(state.length),
         zero: like.lift(state.zero),

@@ -229,6 +229,7 @@ fn one_kind(machine: &Machine, name: &str, sensor: &Sensor, length: bool) -> Ide
     // Points off every axis: a ball on the last axis or a bar centre on the first one would see less.
     let state = SensorState {
         tool_point_t: Vec3([0.031, -0.023, 0.047]),
+        tool_rotation_t: Mat3::identity(0.0),
         workpiece_point_w: Vec3([0.029, 0.037, -0.017]),
         length: 0.0,
         zero: 0.0,

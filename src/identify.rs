@@ -42,6 +42,7 @@ pub use loss::Loss;
 pub(crate) use optimum::{optimum, sources};
 pub use options::{Approach, CalibrateOptions, ErrorModel};
 pub(crate) use places::Places;
+pub(crate) use plausible::by_commands;
 pub use plausible::{Plausibility, as_declared, worst};
 pub(crate) use set_up_values::SetUpValues;
 pub(crate) use settle::Found;
@@ -274,7 +275,7 @@ fn calibrated(machine: &Machine, sources: &Sources, found: &Found) -> Calibrated
     result
 }
 
-/// Frames, tool points, zeros and lengths as found, in place of any of the same name.
+/// Frames, tool points and rotations, zeros and lengths as found, in place of any of the same name.
 fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &Unknowns) {
     let setup = |s: usize| sources.setups[s].clone();
     for (name, frame) in sources.setups.iter().zip(&unknowns.setups) {
@@ -284,6 +285,10 @@ fn put_setups(calibrated: &mut CalibratedMachine, sources: &Sources, unknowns: &
     for (name, at) in sources.tool_points.iter().zip(&unknowns.values.tool_points) {
         calibrated.tool_points.retain(|(known, _)| known != name);
         calibrated.tool_points.push((name.clone(), *at));
+    }
+    for (name, rotation) in sources.tool_rotations.iter().zip(&unknowns.values.tool_rotations) {
+        calibrated.tool_rotations.retain(|(known, _)| known != name);
+        calibrated.tool_rotations.push((name.clone(), *rotation));
     }
     for ((s, of), value) in sources.zeros.iter().zip(&unknowns.values.zeros) {
         calibrated.zeros.retain(|(known, channel, _)| (known, channel) != (&sources.setups[*s], of));

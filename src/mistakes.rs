@@ -4,10 +4,22 @@
 //! are tried on a thinned copy of the recordings with the machine as declared. One is named only if it makes them plausible, and is
 //! better than all others by far.
 
+mod apart;
 mod change;
 mod list;
+mod moved;
+mod nonsense;
+mod odd;
+mod others;
+mod rows;
 mod search;
 mod thinned;
+mod undone;
+mod unsettled;
 
 pub use change::Change;
-pub use search::{Mistake, Nonsense, nonsense, search};
+pub use moved::Moved;
+pub use nonsense::{Apart, Mistake, Nonsense};
+pub use odd::{Odd, odd};
+pub use search::{nonsense, search};
+pub use unsettled::Unsettled;

@@ -9,7 +9,7 @@ use crate::chain::Chain;
 use crate::error::{Error, Result};
 use crate::feature::gravity_of;
 use crate::identify::{Beginning, Evaluator, Memories, Moment, Stretch, Values, channel, stretches};
-use crate::lie::{Pose, Twist, Vec3};
+use crate::lie::{Mat3, Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::recording::{Header, NominalLength, Recording, Role, ToolPoint};
 use crate::residual::Sizes;
@@ -40,6 +40,9 @@ pub struct Prediction {
     pub mean_abs: Rms,
     /// Samples at which a joint leaves the range that the calibration has seen.
     pub extrapolated_samples: u64,
+    /// By how much each joint leaves it at most.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub beyond: Vec<Beyond>,
     /// Samples with a pattern of directions of travel that the calibration has not seen; they are predicted from what single
     /// directions have shown.
     pub unseen_directions: u64,
@@ -49,6 +52,18 @@ pub struct Prediction {
     /// The names of those patterns, such as `AFCR`; `0` is an axis that never moves.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unseen_pieces: Vec<String>,
+}
+
+/// By how much a joint leaves the range that the calibration has seen.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Beyond {
+    /// Its name.
+    pub joint: String,
+    /// The largest amount, m or rad.
+    pub by: f64,
+    /// Unit of the amount, `m` or `rad`.
+    pub unit: String,
 }
 
 /// Model and residual of every sample of a recording; each row goes to `out` as CSV if one is given.
@@ -108,6 +123,7 @@ pub fn predict(
     let mut sizes = ByQuantity::<Sizes>::default();
     let (mut dropped, mut extrapolated) = (0, 0);
     let mut unseen = vec![0u64; evaluator.piece_count()];
+    let mut farthest = vec![0.0f64; machine.commands().len()];
     let (commands, values) = (machine.commands().len(), recording.value_count());
     for block in recording.rows_with_text()? {
         let block = block?;
@@ -116,7 +132,14 @@ pub fn predict(
             if let Some(k) = row.sample {
                 let q = &block.chunk.commands[k * commands..(k + 1) * commands];
                 let measured = &block.chunk.values[k * values..(k + 1) * values];
-                extrapolated += u64::from(calibrated.extrapolates(q));
+                let mut leaves = false;
+                for (command, farthest) in farthest.iter_mut().enumerate() {
+                    if let Some(by) = calibrated.beyond(command, q[command]) {
+                        *farthest = by.max(*farthest);
+                        leaves = true;
+                    }
+                }
+                extrapolated += u64::from(leaves);
                 let moment = if varying.is_constant() { Moment::Still } else { path.next()? };
                 let piece = evaluator.piece(moment);
                 unseen[piece] += u64::from(!variation.has_seen(piece));
@@ -149,6 +172,14 @@ pub fn predict(
         mean: sizes.mean_signed(),
         mean_abs: sizes.mean(),
         extrapolated_samples: extrapolated,
+        beyond: (machine.commands().iter().zip(&farthest).enumerate())
+            .filter(|(_, (_, by))| **by > 0.0)
+            .map(|(c, (joint, by))| Beyond {
+                joint: joint.clone(),
+                by: *by,
+                unit: if machine.command_joint(c).kind == JointKind::Revolute { "rad" } else { "m" }.into(),
+            })
+            .collect(),
         unseen_directions: unseen.iter().sum(),
         left_out,
         unseen_pieces: match &variation.varying.directions {
@@ -252,6 +283,21 @@ pub(crate) fn sensor_state(
                 .1
         }
     };
+    let tool_rotation_t = match &header.tool_rotation_unknown {
+        Some(name) if *sensor == Sensor::Pose => {
+            let found = calibrated.tool_rotations.iter().find(|(known, _)| known == name);
+            let known: Vec<&str> = calibrated.tool_rotations.iter().map(|(n, _)| n.as_str()).collect();
+            found
+                .ok_or_else(|| {
+                    missing(
+                        format!("the rotation of target \"{name}\" is not in the calibrated file"),
+                        &known,
+                    )
+                })?
+                .1
+        }
+        _ => Mat3::identity(0.0),
+    };
     let length = match header.nominal_length {
         NominalLength::Known(length) => length,
         NominalLength::NotGiven => 0.0,
@@ -274,7 +320,8 @@ pub(crate) fn sensor_state(
             })?
             .2;
     }
-    Ok(SensorState { tool_point_t, workpiece_point_w: header.workpiece_point, length, zero })
+    let workpiece_point_w = header.workpiece_point;
+    Ok(SensorState { tool_point_t, tool_rotation_t, workpiece_point_w, length, zero })
 }
 
 /// A measured column: its name and unit as written.

@@ -22,7 +22,7 @@ pub enum Sensor {
     },
     /// Position of the tool point in frame `w`, m.
     Position,
-    /// Position of the tool point in frame `w`, m, and the rotation of frame `t`, rad.
+    /// Position of the tool point in frame `w`, m, and the rotation of the target there, rad.
     Pose,
     /// Movement of the tool point along a unit vector of frame `w`, m.
     Displacement {
@@ -41,6 +41,8 @@ pub enum Sensor {
 pub struct SensorState<S> {
     /// Measured point in frame `t`, m.
     pub tool_point_t: Vec3<S>,
+    /// How the target of a pose is turned in frame `t`.
+    pub tool_rotation_t: Mat3<S>,
     /// Measured point in frame `w`, m.
     pub workpiece_point_w: Vec3<S>,
     /// Nominal length that a relative distance refers to, m.
@@ -58,6 +60,8 @@ pub struct Reading<S> {
     pub by_twist_w: Wrench<S>,
     /// Change of the reading with the tool point, in frame `t`.
     pub by_tool_point_t: Vec3<S>,
+    /// Change of the reading with a small turn of the target, in its own frame.
+    pub by_tool_rotation: Vec3<S>,
 }
 
 impl Sensor {
@@ -97,7 +101,7 @@ impl Sensor {
 
     /// What the instrument reads on the machine at this sweep, for every kind but [`Sensor::Joint`] (which no chain is needed for).
     ///
-    /// `measured_rotation_w` is the measured rotation of `t` in `w`; the rotation readings of a pose are relative to it,
+    /// `measured_rotation_w` is the measured rotation of the target in `w`; the rotation readings of a pose are relative to it,
     /// `-log(R_measured R_modelᵀ)`, so that measured minus model is the rotation vector that is missing.
     pub fn readings<S: Scalar>(
         &self,
@@ -113,6 +117,7 @@ impl Sensor {
             value,
             by_twist_w: Wrench::at_point(n_w, p_w),
             by_tool_point_t: t_from_w * n_w,
+            by_tool_rotation: Vec3::zero(like),
         };
         let unit = |k: usize| Vec3(std::array::from_fn(|i| like.lift(if i == k { 1.0 } else { 0.0 })));
         let mut readings = [along(unit(0), p_w.0[0]); MOST_READINGS];
@@ -133,8 +138,9 @@ impl Sensor {
                 readings[1] = along(unit(1), p_w.0[1]);
                 readings[2] = along(unit(2), p_w.0[2]);
                 // (18): φ = log(R_measured R_modelᵀ); its change with a turn of the model is -J⁻¹(-φ).
+                let target_from_w = (w_from_t.rotation * state.tool_rotation_t).transpose();
                 let missing = crate::lie::Pose {
-                    rotation: measured_rotation_w.lift(like) * w_from_t.rotation.transpose(),
+                    rotation: measured_rotation_w.lift(like) * target_from_w,
                     translation: Vec3::zero(like),
                 };
                 let phi = missing.rotation_vector();
@@ -144,6 +150,7 @@ impl Sensor {
                         value: -phi.0[k],
                         by_twist_w: Wrench::couple(Vec3(jacobian.0[k])),
                         by_tool_point_t: Vec3::zero(like),
+                        by_tool_rotation: target_from_w * Vec3(jacobian.0[k]),
                     };
                 }
             }

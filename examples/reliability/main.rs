@@ -4,6 +4,8 @@
 //! cargo run --features measure --example reliability -- docs/reliability.md
 //! ```
 //!
+//! With `--drawn 10000` so many machines are drawn instead, and found from afar.
+//!
 //! Each table takes the place of what stands between its marks, `<!-- mistakes -->` and `<!-- /mistakes -->`; without a file they are printed.
 
 #[path = "../../tests/common/mod.rs"]
@@ -13,9 +15,10 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use common::machines;
-use common::planted::{PLANTED, far, is_named, said_of, sound};
+use common::planted::{PLANTED, drawn, far, is_named, said_of, sound};
 use kincal::mistakes::Nonsense;
 use kincal::sensor::Sensor;
+use rayon::prelude::*;
 
 /// Sound recordings.
 const SOUND: u64 = 200;
@@ -23,6 +26,10 @@ const SOUND: u64 = 200;
 const SIZES: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
 
 fn main() -> std::io::Result<()> {
+    let mut args = std::env::args().skip(1);
+    if args.next().as_deref() == Some("--drawn") {
+        return drawn_ones(args.next().and_then(|n| n.parse().ok()).unwrap_or(10_000));
+    }
     let parts = [("mistakes", mistakes()), ("sound", sound_ones()), ("afar", afar())];
     let Some(path) = std::env::args_os().nth(1).map(PathBuf::from) else {
         parts.iter().for_each(|(_, body)| println!("{body}"));
@@ -38,6 +45,14 @@ fn main() -> std::io::Result<()> {
         page = format!("{}\n\n{}\n\n{}", &page[..from + begin.len()], body.trim(), &page[to..]);
     }
     std::fs::write(path, page)
+}
+
+/// Machines that are drawn, one after the other.
+fn drawn_ones(count: u64) -> std::io::Result<()> {
+    let missed: Vec<String> = (0..count).into_par_iter().filter_map(|draw| drawn(draw).err()).collect();
+    missed.iter().for_each(|missed| println!("{missed}"));
+    println!("{} of {count} reach the noise", count - missed.len() as u64);
+    Ok(())
 }
 
 fn shown(said: &Nonsense, si: f64) -> String {

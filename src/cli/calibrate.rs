@@ -175,7 +175,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let found = calibrate_model(&machine, &recordings, &args.model(&machine)?, args.options(), &|text| {
         progress.say(text)
     });
-    let (calibrated, fit) = found?;
+    let (calibrated, mut fit) = found?;
+    let notes = verdict::of_recordings(&machine, &recordings, args.force, &|text| progress.say(text))?;
+    fit.warnings.extend(notes);
     let note = verdict::of_fit(&machine, &recordings, &fit, args.force, &|text| progress.say(text))?;
     drop(progress);
     let mut text = render(&fit, args.all);

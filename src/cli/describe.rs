@@ -229,6 +229,12 @@ fn render_calibration(calibrated: &CalibratedMachine) -> String {
             format!("at {} mm in frame t", triple(at.0, Kind::Length)),
         ]);
     }
+    for (name, turned) in calibrated.tool_rotations() {
+        rows.push(vec![
+            format!("target {name}"),
+            format!("turned {} deg in frame t", triple(turned.0, Kind::Angle)),
+        ]);
+    }
     for (name, channel, value) in calibrated.zeros() {
         let (scaled, unit) = in_mm_or_deg(calibrated, channel, value);
         rows.push(vec![of(name), format!("zero of {channel}: {scaled:+.5} {unit}")]);
@@ -273,6 +279,10 @@ fn calibration(calibrated: &CalibratedMachine) -> Value {
         .collect();
     let tool_points: Vec<Value> =
         calibrated.tool_points().map(|(name, at)| json!({"name": name, "at_m": at.0})).collect();
+    let tool_rotations: Vec<Value> = calibrated
+        .tool_rotations()
+        .map(|(name, turned)| json!({"name": name, "rotation_rad": turned.0}))
+        .collect();
     let zeros: Vec<Value> = calibrated
         .zeros()
         .map(|(setup, of, value)| json!({"setup": setup, "of": of, "value": value}))
@@ -287,7 +297,8 @@ fn calibration(calibrated: &CalibratedMachine) -> Value {
         .collect();
     json!({
         "samples": calibrated.samples(), "rms_m": calibrated.rms().m, "rms_rad": calibrated.rms().rad,
-        "deviations": deviations, "setups": setups, "tool_points": tool_points, "zeros": zeros,
+        "deviations": deviations, "setups": setups, "tool_points": tool_points,
+        "tool_rotations": tool_rotations, "zeros": zeros,
         "lengths": lengths, "seen": seen,
     })
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
 use crate::identify::{Loss, fit_setup};
-use crate::predict::{Prediction, predict};
+use crate::predict::{Beyond, Prediction, predict};
 
 use super::Common;
 use super::files::Output;
@@ -73,6 +73,13 @@ pub(crate) fn run(args: &Args) -> Outcome {
     args.common.write_json(&prediction)
 }
 
+fn by_how_much(beyond: &Beyond) -> String {
+    match beyond.unit.as_str() {
+        "rad" => format!("{} by up to {:.3} deg", beyond.joint, beyond.by.to_degrees()),
+        _ => format!("{} by up to {:.3} mm", beyond.joint, beyond.by * 1e3),
+    }
+}
+
 fn render(p: &Prediction, name: &str) -> String {
     let mut text = format!("{name}: {}", count(p.samples, "sample", "samples"));
     if p.dropped > 0 {
@@ -90,8 +97,9 @@ fn render(p: &Prediction, name: &str) -> String {
     }
     if p.extrapolated_samples > 0 {
         text.push_str(&format!(
-            "note: at {} a joint leaves the range that the calibration has seen\n",
-            count(p.extrapolated_samples, "sample", "samples")
+            "note: at {} a joint leaves the range that the calibration has seen: {}\n",
+            count(p.extrapolated_samples, "sample", "samples"),
+            p.beyond.iter().map(by_how_much).collect::<Vec<_>>().join(", ")
         ));
     }
     for left in &p.left_out {

@@ -61,6 +61,8 @@ pub(super) struct Linear {
     pub constant: DMatrix<f64>,
     /// What features see, one stretch a recording.
     pub samples: Vec<Samples>,
+    /// What is known of each constant column beforehand.
+    tolerated: Vec<(Option<f64>, f64)>,
     /// Where the machine is linearised.
     unknowns: Unknowns,
 }
@@ -104,6 +106,12 @@ impl Linear {
         let all: f64 = self.spans.iter().map(rows).sum();
         let squares = self.spans.iter().map(|span| rows(span) * span.steps[usize::from(angle)].powi(2));
         (squares.sum::<f64>() / all.max(1.0)).sqrt()
+    }
+
+    /// Of every constant column that tolerances hold the information of its prior, and where zero lies, seen from the optimum; `None` of
+    /// what nothing is known of. In the units of the columns.
+    pub fn tolerated(&self) -> Vec<(Option<f64>, f64)> {
+        self.tolerated.clone()
     }
 
     /// The same readings where geometry and effects have been displaced.
@@ -166,6 +174,7 @@ impl Columns {
             Role::ToolPoint(i) => self.places.tool_point(i),
             Role::Zero(i) => self.places.zero(i),
             Role::Length(i) => self.places.length(i),
+            Role::ToolRotation(i) => self.places.tool_rotation(i),
             Role::Part { .. } | Role::Term(_) => self.count(),
         }
     }
@@ -206,9 +215,17 @@ fn rows(
         carried: DMatrix::zeros(count, 6 * dyads),
         constant: DMatrix::zeros(count, columns.count()),
         samples: Vec::new(),
+        tolerated: vec![(None, 0.0); columns.count()],
         unknowns,
     };
     let unknowns = linear.unknowns.clone();
+    for block in &Layout::new(machine, sources, &CONSTANT, 1.0).blocks {
+        let (first, total) = (columns.first(block.role), unknowns.total(block));
+        for k in (0..block.len).filter(|_| block.prior) {
+            let scale = columns.scale(block.role, k);
+            linear.tolerated[first + k] = (Some((scale / block.scale[k]).powi(2)), -total[k] / scale);
+        }
+    }
     for source in &sources.all {
         let evaluator = Evaluator::new(machine, &unknowns, source);
         let mut work = evaluator.workspace();
@@ -288,6 +305,9 @@ fn rows(
                     }
                     if let Known::Unknown(l) = source.length {
                         put(Role::Length(l), 4, 1);
+                    }
+                    if let Known::Unknown(r) = source.tool_rotation {
+                        put(Role::ToolRotation(r), 5, 3);
                     }
                 }
                 linear.lines.push(chunk.lines[k]);

@@ -50,9 +50,10 @@ pub(super) fn left_out(
     let effects: Option<Vec<DMatrix<f64>>> = told.iter().map(|effect| effect.raw(search)).collect();
     let meaningless: Vec<DMatrix<f64>> = placebos.iter().flatten().map(|p| p.raw.clone()).collect();
     let (Some(effects), true) = (effects, says(search, &names)) else { return Vec::new() };
-    let geometric = SetUps::new(search, &names, &[]).left(search);
-    let with_all = SetUps::new(search, &names, &effects).left(search);
-    let instead = (!meaningless.is_empty()).then(|| SetUps::new(search, &names, &meaningless).left(search));
+    let left =
+        |effects: &[DMatrix<f64>]| SetUps::new(search, &names, effects).with_tolerances(search).left(search);
+    let (geometric, with_all) = (left(&[]), left(&effects));
+    let instead = (!meaningless.is_empty()).then(|| left(&meaningless));
     let one = |name: &String| {
         let rms = |angle: bool| {
             let rms = |left: &[f64]| {
@@ -121,6 +122,8 @@ struct SetUps {
     of_row: Vec<usize>,
     /// Of the whitened rows of each set-up.
     normal: Vec<(DMatrix<f64>, DVector<f64>)>,
+    /// What is known of each column beforehand: its information, and that times where it stands at most likely.
+    before: (DVector<f64>, DVector<f64>),
 }
 
 /// A column that has no more than this part of its energy elsewhere belongs to its set-up.
@@ -148,7 +151,19 @@ impl SetUps {
             (gram(&own, &own), own.tr_mul(&residual))
         };
         let normal = (0..names.len()).map(one).collect();
-        SetUps { raw, of_row, normal }
+        let before = (DVector::from_element(raw.ncols(), 1.0), DVector::zeros(raw.ncols()));
+        SetUps { raw, of_row, normal, before }
+    }
+
+    /// With what `calibrate` knows beforehand, of deviations their tolerances and that they lie about zero: rows are taken at the optimum of
+    /// all set-ups, and would keep what the one that is left out has told.
+    fn with_tolerances(mut self, search: &Search) -> Self {
+        for (column, (information, at)) in search.rows.linear.tolerated().into_iter().enumerate() {
+            if let Some(information) = information {
+                (self.before.0[column], self.before.1[column]) = (information, information * at);
+            }
+        }
+        self
     }
 
     /// Residuals of every row, m and rad: what its machine is like is known from the other set-ups alone, and what belongs to its own
@@ -167,10 +182,10 @@ impl SetUps {
     fn without(&self, setup: usize) -> Option<DVector<f64>> {
         let width = self.raw.ncols();
         let others = self.normal.iter().enumerate().filter(|(s, _)| *s != setup);
-        let start = (DMatrix::<f64>::identity(width, width), DVector::<f64>::zeros(width));
+        let start = (DMatrix::from_diagonal(&self.before.0), self.before.1.clone());
         let (known, toward) = others.fold(start, |(g, b), (_, (own, toward))| (g + own, b + toward));
         let (here, toward_here) = &self.normal[setup];
-        let is_own = |c: &usize| known[(*c, *c)] - 1.0 <= ELSEWHERE * here[(*c, *c)];
+        let is_own = |c: &usize| known[(*c, *c)] - self.before.0[*c] <= ELSEWHERE * here[(*c, *c)];
         let own: Vec<usize> = (0..width).filter(is_own).collect();
         let mut x = Cholesky::new(known.clone())?.solve(&toward);
         let left = (toward_here - here * &x).select_rows(&own);

@@ -1,9 +1,9 @@
-//! Where the set-ups stand, from nothing: closed-form starts for unknown frames, tool points and lengths, `docs/model.md` (25), (26).
+//! Where the set-ups stand, from nothing: closed-form starts for unknown frames, tool points, turns of targets and lengths, `docs/model.md` (25), (26).
 //!
 //! Nothing here uses the nominal frame `w` of the machine file, so a start that is wrong by half a turn cannot mislead it; only
 //! what the data leave open (two socket points leave the turn about their line) is taken from there.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SVD, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVD, Vector3};
 
 use super::normal::point;
 use super::source::{Known, Sources};
@@ -41,6 +41,7 @@ pub(crate) fn align(machine: &Machine, sources: &Sources, thin: &[Thin], unknown
             let m_from_w = unknowns.setups[setup].pose();
             let everything: Vec<&Sight> = sights.iter().collect();
             shift_tool_points(sources, &everything, m_from_w, unknowns);
+            shift_tool_rotations(sources, &everything, m_from_w, unknowns);
         }
     }
     start_lengths(machine, sources, thin, unknowns);
@@ -67,20 +68,66 @@ fn sights(
     .collect()
 }
 
-/// Alignment of one set-up whose frame is unknown.
+/// Alignment of one set-up whose frame is unknown. Where it is unknown how a target is turned, the frame is found twice: from the measured
+/// turns and from the measured points alone. Neither sees it in every recording; the start that leaves less is taken.
 fn align_setup(sources: &Sources, setup: usize, sights: Vec<Sight>, unknowns: &mut Unknowns) {
     let nominal = unknowns.setups[setup].previous_from_w;
+    let is_turned = |s: &Sight| sources.all[s.source].tool_rotation.unknown().is_some();
+    let ways: &[bool] = if sights.iter().any(is_turned) { &[true, false] } else { &[true] };
+    let start = unknowns.clone();
+    let mut best = f64::INFINITY;
+    for by_turns in ways {
+        let mut own = start.clone();
+        let m_from_w = align_one_way(sources, nominal, &sights, *by_turns, &mut own);
+        let left = if ways.len() > 1 { left(sources, &sights, m_from_w, &own) } else { 0.0 };
+        if left < best {
+            best = left;
+            *unknowns = own;
+            unknowns.setups[setup].previous_from_w = m_from_w;
+        }
+    }
+}
+
+/// Medians of what points are off by, over their spread, and of what turns are off by, rad.
+fn left(sources: &Sources, sights: &[Sight], m_from_w: Pose<f64>, unknowns: &Unknowns) -> f64 {
+    let median = |mut sizes: Vec<f64>| {
+        sizes.sort_by(f64::total_cmp);
+        sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)
+    };
+    let origin = sights[0].m_from_t.translation;
+    let spread = median(sights.iter().map(|s| (s.m_from_t.translation - origin).norm()).collect());
+    let points = median(sights.iter().filter_map(|s| miss(sources, s, m_from_w, unknowns)).collect());
+    let turns = sights.iter().filter(|s| sources.all[s.source].sensor == Sensor::Pose).map(|s| {
+        let state = unknowns.values.sensor_state(&sources.all[s.source]);
+        let seen = m_from_w.rotation * measured_rotation(s);
+        let rotation = seen.transpose() * (s.m_from_t.rotation * state.tool_rotation_t);
+        Pose { rotation, translation: Vec3([0.0; 3]) }.rotation_vector().norm()
+    });
+    points / spread.max(f64::MIN_POSITIVE) + median(turns.collect())
+}
+
+/// Alignment from measured turns, or only from those of targets of which it is known how they are turned.
+fn align_one_way(
+    sources: &Sources,
+    nominal: Pose<f64>,
+    sights: &[Sight],
+    by_turns: bool,
+    unknowns: &mut Unknowns,
+) -> Pose<f64> {
     let mut kept: Vec<&Sight> = sights.iter().collect();
     let mut m_from_w = nominal;
     for _ in 0..ATTEMPTS {
         start_tool_points(sources, &kept, unknowns);
+        if by_turns {
+            start_tool_rotations(sources, &kept, unknowns);
+        }
         for _ in 0..ROUNDS {
-            let next = best_frame(sources, &kept, nominal, unknowns);
+            let next = best_frame(sources, &kept, nominal, by_turns, unknowns);
             let moved = (next.inverse() * m_from_w).log();
             m_from_w = next;
-            if !shift_tool_points(sources, &kept, m_from_w, unknowns)
-                || moved.v.norm() + moved.w.norm() < 1e-7
-            {
+            let shifted = shift_tool_points(sources, &kept, m_from_w, unknowns);
+            let turned = shift_tool_rotations(sources, &kept, m_from_w, unknowns);
+            if !(shifted || turned) || moved.v.norm() + moved.w.norm() < 1e-7 {
                 break;
             }
         }
@@ -97,7 +144,55 @@ fn align_setup(sources: &Sources, setup: usize, sights: Vec<Sight>, unknowns: &m
             break;
         }
     }
-    unknowns.setups[setup].previous_from_w = m_from_w;
+    m_from_w
+}
+
+fn measured_rotation(sight: &Sight) -> Mat3<f64> {
+    Pose::exp(Twist::new(Vec3([0.0; 3]), point(&sight.values[3..]))).rotation
+}
+
+/// How the targets are turned in `t`: `R_mw W = R_mt X` for every measured turn `W`, with `R_mw` and `X` unknown. `Σ tr((R_mw W)ᵀ R_mt X)` is
+/// bilinear in both, so that the largest singular vectors of its matrix are their best values; only `X` is kept.
+fn start_tool_rotations(sources: &Sources, sights: &[&Sight], unknowns: &mut Unknowns) {
+    for index in 0..unknowns.values.tool_rotations.len() {
+        let mut matrix = SMatrix::<f64, 9, 9>::zeros();
+        for sight in sights.iter().filter(|s| sources.all[s.source].tool_rotation.unknown() == Some(index)) {
+            let (measured, modelled) = (measured_rotation(sight), sight.m_from_t.rotation);
+            for (row, column) in (0..81).map(|i| (i / 9, i % 9)) {
+                let (a, b, d, c) = (row / 3, row % 3, column / 3, column % 3);
+                matrix[(row, column)] += measured.0[b][c] * modelled.0[a][d];
+            }
+        }
+        let svd = SVD::new(matrix, false, true);
+        let Some(v_t) = svd.v_t.filter(|_| matrix.amax() > 0.0) else { continue };
+        let largest = svd.singular_values.imax();
+        let found = Matrix3::from_fn(|i, j| v_t[(largest, 3 * i + j)]);
+        let found = if found.determinant() < 0.0 { -found } else { found };
+        unknowns.values.tool_rotations[index] = best_rotation(found, Mat3::identity(0.0));
+    }
+}
+
+/// Least-squares turn of every target for a given frame; whether there was one.
+fn shift_tool_rotations(
+    sources: &Sources,
+    sights: &[&Sight],
+    m_from_w: Pose<f64>,
+    unknowns: &mut Unknowns,
+) -> bool {
+    let mut any = false;
+    for index in 0..unknowns.values.tool_rotations.len() {
+        let mut turns = Matrix3::zeros();
+        for sight in sights.iter().filter(|s| sources.all[s.source].tool_rotation.unknown() == Some(index)) {
+            let seen = m_from_w.rotation * measured_rotation(sight);
+            turns += matrix3(sight.m_from_t.rotation.transpose() * seen);
+            any = true;
+        }
+        if turns != Matrix3::zeros() {
+            let present = unknowns.values.tool_rotations[index];
+            unknowns.values.tool_rotations[index] = best_rotation(turns, present);
+        }
+    }
+    any
 }
 
 /// How far a sight with a position lies off, m.
@@ -185,6 +280,7 @@ fn best_frame(
     sources: &Sources,
     sights: &[&Sight],
     nominal: Pose<f64>,
+    by_turns: bool,
     unknowns: &mut Unknowns,
 ) -> Pose<f64> {
     // Pairs: a point in `w` and the same point in the frame that carries `w`.
@@ -202,10 +298,10 @@ fn best_frame(
             Sensor::Position => pairs.extend(own.iter().map(|s| (point(&s.values), modelled(s)))),
             Sensor::Pose => {
                 pairs.extend(own.iter().map(|s| (point(&s.values), modelled(s))));
-                for sight in &own {
-                    let w = point(&sight.values[3..]);
-                    let w_from_t = Pose::exp(Twist::new(Vec3([0.0; 3]), w)).rotation;
-                    turns += matrix3(sight.m_from_t.rotation * w_from_t.transpose());
+                let target = unknowns.values.sensor_state(source).tool_rotation_t;
+                for sight in own.iter().filter(|_| by_turns || source.tool_rotation.unknown().is_none()) {
+                    let turned = sight.m_from_t.rotation * target;
+                    turns += matrix3(turned * measured_rotation(sight).transpose());
                 }
             }
             Sensor::Distance { absolute } => {

@@ -10,8 +10,8 @@ use crate::machine::Machine;
 use crate::sensor::{MOST_READINGS, Sensor, SensorState};
 use crate::variation::{Directions, Slot, Term};
 
-/// Extra columns of a source behind the six of each dyad: tool point, zero, length.
-pub(crate) const EXTRAS: usize = 5;
+/// Extra columns of a source behind the six of each dyad: tool point, zero, length, tool rotation.
+pub(crate) const EXTRAS: usize = 8;
 
 /// Deviations of one pattern of directions.
 pub(crate) struct Piece {
@@ -250,6 +250,7 @@ impl<'a> Evaluator<'a> {
                 row[6 * dyads..6 * dyads + 3].copy_from_slice(&reading.by_tool_point_t.0);
                 row[6 * dyads + 3] = if self.sensor.has_zero() { 1.0 } else { 0.0 };
                 row[6 * dyads + 4] = if relative { -1.0 } else { 0.0 };
+                row[6 * dyads + 5..6 * dyads + 8].copy_from_slice(&reading.by_tool_rotation.0);
                 if let Moment::At(..) = moment {
                     self.varying_columns(i, reading.by_twist_w, row, work);
                 }

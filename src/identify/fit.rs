@@ -415,6 +415,7 @@ fn labels(problem: &Problem) -> Vec<String> {
         Role::ToolPoint(i) => format!("tool point {}.{}", sources.tool_points[i], ["x", "y", "z"][k]),
         Role::Zero(i) => format!("zero of {}{}", sources.zeros[i].1, of(sources.zeros[i].0)),
         Role::Length(i) => format!("nominal length{}", of(sources.lengths[i])),
+        Role::ToolRotation(i) => format!("target {}.{}", sources.tool_rotations[i], COMPONENTS[3 + k]),
         Role::Part { set, dyad } => {
             let axes =
                 problem.varying.directions.as_ref().map_or(String::new(), |d| d.set_name(machine, set));

@@ -328,6 +328,9 @@ impl Normal {
         if let Some(i) = source.length.unknown() {
             put(6 * dyads + 4, 1, Role::Length(i), 1.0);
         }
+        if let Some(i) = source.tool_rotation.unknown() {
+            put(6 * dyads + 5, 3, Role::ToolRotation(i), 1.0);
+        }
         for local in 6 * dyads + EXTRAS..evaluator.width() {
             put(local, 1, Role::Term(local - 6 * dyads - EXTRAS), 1.0);
         }

@@ -3,7 +3,7 @@
 use super::source::Sources;
 use crate::machine::Machine;
 
-/// Six per dyad in machine order (those of `w` are the first set-up's), six per further set-up, then tool points, zeros and lengths.
+/// Six per dyad in machine order (those of `w` are the first set-up's), six per further set-up, then tool points, zeros, lengths and tool rotations.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Places {
     dyads: usize,
@@ -12,6 +12,7 @@ pub(crate) struct Places {
     tool_points: usize,
     zeros: usize,
     lengths: usize,
+    tool_rotations: usize,
 }
 
 impl Places {
@@ -23,6 +24,7 @@ impl Places {
             tool_points: sources.tool_points.len(),
             zeros: sources.zeros.len(),
             lengths: sources.lengths.len(),
+            tool_rotations: sources.tool_rotations.len(),
         }
     }
 
@@ -47,12 +49,17 @@ impl Places {
         self.zero(self.zeros) + i
     }
 
+    pub fn tool_rotation(&self, i: usize) -> usize {
+        self.length(self.lengths) + 3 * i
+    }
+
     pub fn len(&self) -> usize {
-        self.length(self.lengths)
+        self.tool_rotation(self.tool_rotations)
     }
 
     /// Whether parameter `k` is a translation rather than a turn.
     pub fn is_translation(&self, k: usize) -> bool {
-        k >= self.behind_frames() || k % 6 < 3
+        let frames = self.behind_frames();
+        (frames..self.tool_rotation(0)).contains(&k) || (k < frames && k % 6 < 3)
     }
 }

@@ -192,13 +192,18 @@ fn foretold(machine: &Machine, row: &[f64], with_w: bool) -> f64 {
 
 /// Variance of a reading by commands that are spread so.
 fn moved(machine: &Machine, row: &[f64], spread: &[f64]) -> f64 {
-    let mut by_command = vec![0.0; spread.len()];
+    by_commands(machine, row).iter().zip(spread).map(|(slope, spread)| (slope * spread).powi(2)).sum()
+}
+
+/// How a reading answers to each command, per m or rad, from its row over the deviations.
+pub(crate) fn by_commands(machine: &Machine, row: &[f64]) -> Vec<f64> {
+    let mut by_command = vec![0.0; machine.commands().len()];
     for (j, joint) in machine.joints() {
         let Some(drive) = machine.drive(j) else { continue };
         let along: f64 = row[6 * j..6 * j + 6].iter().zip(joint.twist().to_array()).map(|(x, y)| x * y).sum();
         drive.terms.iter().for_each(|(c, factor)| by_command[*c] += factor * along);
     }
-    by_command.iter().zip(spread).map(|(slope, spread)| (slope * spread).powi(2)).sum()
+    by_command
 }
 
 fn quantile(sizes: &mut [f64]) -> f64 {

@@ -1,7 +1,7 @@
-//! What the recordings leave unknown of their set-ups beside frame `w`: tool points, zeros, lengths.
+//! What the recordings leave unknown of their set-ups beside frame `w`: tool points and rotations, zeros, lengths.
 
 use super::source::{Known, Source, Sources};
-use crate::lie::Vec3;
+use crate::lie::{Mat3, Vec3};
 use crate::sensor::SensorState;
 
 /// Present values, in the order of [`Sources`].
@@ -13,15 +13,18 @@ pub(crate) struct SetUpValues {
     pub zeros: Vec<f64>,
     /// m.
     pub lengths: Vec<f64>,
+    /// Of targets in frame `t`.
+    pub tool_rotations: Vec<Mat3<f64>>,
 }
 
 impl SetUpValues {
-    /// All zero.
+    /// All zero, targets turned as frame `t`.
     pub fn zero(sources: &Sources) -> Self {
         SetUpValues {
             tool_points: vec![Vec3([0.0; 3]); sources.tool_points.len()],
             zeros: vec![0.0; sources.zeros.len()],
             lengths: vec![0.0; sources.lengths.len()],
+            tool_rotations: vec![Mat3::identity(0.0); sources.tool_rotations.len()],
         }
     }
 
@@ -29,6 +32,7 @@ impl SetUpValues {
     pub fn sensor_state(&self, source: &Source) -> SensorState<f64> {
         SensorState {
             tool_point_t: source.tool_point.among(&self.tool_points),
+            tool_rotation_t: source.tool_rotation.among(&self.tool_rotations),
             workpiece_point_w: source.recording.header().workpiece_point,
             length: source.length.among(&self.lengths),
             zero: source.zero.among(&self.zeros),

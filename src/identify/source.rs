@@ -8,7 +8,7 @@ use super::Approach;
 use super::stretch::{Beginning, Memories, Stretch, stretches};
 use crate::error::Result;
 use crate::feature::{Feature, gravity_of};
-use crate::lie::{Pose, Vec3};
+use crate::lie::{Mat3, Pose, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::recording::{Measurement, NominalLength, Recording, Summary, ToolPoint};
 use crate::sensor::Sensor;
@@ -49,6 +49,8 @@ pub(crate) struct Source<'a> {
     pub setup: usize,
     /// Measured point in frame `t`, m.
     pub tool_point: Known<Vec3<f64>>,
+    /// How the target of a pose is turned in frame `t`.
+    pub tool_rotation: Known<Mat3<f64>>,
     /// Reading at zero, m or rad.
     pub zero: Known<f64>,
     /// Length that a relative distance refers to, m.
@@ -126,6 +128,8 @@ pub(crate) struct Sources<'a> {
     /// Whether a set-up's frame `w` is to be found from nothing.
     pub frame_unknown: Vec<bool>,
     pub tool_points: Vec<String>,
+    /// Names of targets whose rotation is unknown.
+    pub tool_rotations: Vec<String>,
     /// Set-up and channel of each unknown zero.
     pub zeros: Vec<(usize, String)>,
     /// Set-up of each unknown length.
@@ -162,6 +166,7 @@ impl<'a> Sources<'a> {
             setups: Vec::new(),
             frame_unknown: Vec::new(),
             tool_points: Vec::new(),
+            tool_rotations: Vec::new(),
             zeros: Vec::new(),
             lengths: Vec::new(),
             machine,
@@ -299,6 +304,12 @@ impl<'a> Sources<'a> {
             ToolPoint::Known(point) => Known::Value(*point),
             ToolPoint::Unknown(name) => Known::Unknown(index_of(&mut self.tool_points, name.clone())),
         };
+        let tool_rotation = match &header.tool_rotation_unknown {
+            Some(name) if sensor == Sensor::Pose => {
+                Known::Unknown(index_of(&mut self.tool_rotations, name.clone()))
+            }
+            _ => Known::Value(Mat3::identity(0.0)),
+        };
         self.all.push(Source {
             recording,
             label,
@@ -306,6 +317,7 @@ impl<'a> Sources<'a> {
             sensor,
             setup,
             tool_point,
+            tool_rotation,
             zero,
             length,
             cached: None,

@@ -18,6 +18,8 @@ pub(crate) enum Role {
     Setup(usize),
     /// Unknown tool point, three numbers.
     ToolPoint(usize),
+    /// Unknown rotation of a target, three numbers.
+    ToolRotation(usize),
     /// Unknown zero.
     Zero(usize),
     /// Unknown length.
@@ -48,7 +50,7 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Every dyad but `w`, then frames, tool points, zeros and lengths of the set-ups, then what varies. `but_play` is a factor on the
+    /// Every dyad but `w`, then frames, tool points, zeros, lengths and tool rotations of the set-ups, then what varies. `but_play` is a factor on the
     /// prior of direction parts other than play.
     pub fn new(machine: &Machine, sources: &Sources, varying: &Varying, but_play: f64) -> Self {
         let mut layout = Layout { blocks: Vec::new(), len: 0 };
@@ -80,6 +82,9 @@ impl Layout {
         }
         for i in 0..sources.lengths.len() {
             layout.push(Role::Length(i), 1, [free(machine.t_index()).0; 6], false);
+        }
+        for i in 0..sources.tool_rotations.len() {
+            layout.push(Role::ToolRotation(i), 3, [free(machine.t_index()).1; 6], false);
         }
         if let Some(directions) = &varying.directions {
             for set in 0..directions.sets().len() {
@@ -197,7 +202,7 @@ impl Unknowns {
             Role::Setup(s) => self.setups[s].dh.to_array(),
             Role::Part { set, dyad } => self.parts[set][dyad].to_array(),
             Role::Term(i) => [self.coefficients[i]; 6],
-            Role::ToolPoint(_) | Role::Zero(_) | Role::Length(_) => [0.0; 6],
+            Role::ToolPoint(_) | Role::Zero(_) | Role::Length(_) | Role::ToolRotation(_) => [0.0; 6],
         }
     }
 
@@ -223,6 +228,11 @@ impl Unknowns {
                 }
                 Role::Zero(i) => next.values.zeros[i] += at(0),
                 Role::Length(i) => next.values.lengths[i] += at(0),
+                Role::ToolRotation(i) => {
+                    let turn = Pose::exp(Twist::new(Vec3([0.0; 3]), Vec3(std::array::from_fn(at))));
+                    let rotation = &mut next.values.tool_rotations[i];
+                    *rotation = *rotation * turn.rotation;
+                }
                 Role::Part { set, dyad } => {
                     let part = &mut next.parts[set][dyad];
                     *part = *part + Twist::from_array(std::array::from_fn(at));

@@ -34,6 +34,17 @@ pub enum Change {
     },
     /// What was measured is the pose of `w` in `t`.
     Inverse,
+    /// Commands were read before the machine had settled, each short of where it came to rest by so large a part of its move.
+    Unsettled(Vec<f64>),
+    /// Where the target sits on the tool, or how it is turned there, is not what the recordings say, and new in every set-up.
+    Target {
+        /// Where it sits.
+        place: bool,
+        /// How it is turned.
+        rotation: bool,
+    },
+    /// Where the instrument stands is not what the recordings say.
+    Frame,
     /// Readings are in the opposite order of the commands.
     Backwards,
     /// Readings belong to commands so many rows further on.
@@ -48,6 +59,14 @@ impl Change {
         let mut samples = thinned.samples.clone();
         let lengths = |i: usize| thinned.quantity(i) == Quantity::Length;
         match self {
+            Change::Target { .. } | Change::Frame => {}
+            Change::Unsettled(parts) => {
+                for (sample, before) in samples.iter_mut().zip(thinned.commands_before()) {
+                    for ((command, before), part) in sample.commands.iter_mut().zip(before).zip(parts) {
+                        *command += part * (*command - before);
+                    }
+                }
+            }
             Change::Sign(c) => samples.iter_mut().for_each(|s| s.commands[*c] *= -1.0),
             Change::Swapped(a, b) => samples.iter_mut().for_each(|s| s.commands.swap(*a, *b)),
             Change::Units(commands, written, meant) => {
@@ -95,6 +114,41 @@ impl Change {
         samples
     }
 
+    /// The recording with the lines of its head as without the mistake.
+    pub(super) fn applied_to_head(&self, thinned: &Thinned) -> Thinned {
+        let mut other = thinned.clone();
+        other.head = self.head(thinned);
+        other
+    }
+
+    /// The lines of the head without the mistake.
+    pub(super) fn head(&self, thinned: &Thinned) -> Vec<String> {
+        let mut head = thinned.head.clone();
+        let mut put = |key: &str, value: &str| {
+            let is_own = |line: &String| {
+                let rest = line.trim_start_matches('#').trim_start().strip_prefix(key);
+                rest.is_some_and(|rest| rest.trim_start().starts_with([':', '[']))
+            };
+            head.retain(|line| !is_own(line));
+            head.push(format!("# {key}: {value}"));
+        };
+        // A name that no recording has.
+        let own = format!("unknown (mounted for {})", thinned.header.setup);
+        match self {
+            Change::Target { place, rotation } => {
+                if *place {
+                    put("tool_point", &own);
+                }
+                if *rotation {
+                    put("tool_rotation", &own);
+                }
+            }
+            Change::Frame => put("workpiece_frame", "unknown"),
+            _ => {}
+        }
+        head
+    }
+
     /// The mistake, as the part of a sentence that follows "with".
     pub fn in_words(&self, machine: &Machine) -> String {
         let name = |c: &usize| machine.commands()[*c].as_str();
@@ -116,6 +170,16 @@ impl Change {
             Change::Quaternion { scalar_last: true } => "the scalar part of quaternions read last".into(),
             Change::Quaternion { scalar_last: false } => "the scalar part of quaternions read first".into(),
             Change::Inverse => "the measured pose inverted".into(),
+            Change::Target { place, rotation } => {
+                format!("{} unknown, one for each set-up,", target(*place, *rotation))
+            }
+            Change::Frame => "frame w unknown".into(),
+            Change::Unsettled(parts) => {
+                let all: Vec<String> = (machine.commands().iter().zip(parts))
+                    .map(|(joint, part)| format!("{joint} {:+.1} %", 100.0 * part))
+                    .collect();
+                format!("joints moved on by a part of the move that led there ({})", all.join(", "))
+            }
             Change::Backwards => "the readings in the opposite order".into(),
             Change::Rows(rows) => format!("the readings {}", shifted(*rows)),
             Change::CommandRows(c, rows) => format!("column {} {}", name(c), shifted(*rows)),
@@ -148,9 +212,24 @@ impl Change {
             Change::Turn => "turn the signs of `rx`, `ry`, `rz` (of `qx`, `qy`, `qz`): the turn is that of t as seen from w".into(),
             Change::Quaternion { .. } => "name the columns of the quaternion by what they are: `qw` is the scalar part".into(),
             Change::Inverse => "write the pose of t in w, not that of w in t".into(),
+            Change::Target { place, rotation } => {
+                let keys = [(*place, "`# tool_point: unknown NAME`"), (*rotation, "`# tool_rotation: unknown NAME`")];
+                let keys: Vec<&str> = keys.iter().filter(|(meant, _)| *meant).map(|(_, key)| *key).collect();
+                format!("add {} to the head, a NAME for each mounting of the target", keys.join(" and "))
+            }
+            Change::Frame => "add `# workpiece_frame: unknown` to the head, and a name of its own with `# setup: NAME`".into(),
+            Change::Unsettled(_) => "read joints and target at the same time, once the machine stands still".into(),
             Change::Backwards => "put the readings into the order of the commands".into(),
             Change::Rows(_) | Change::CommandRows(..) => "put what belongs together into one row".into(),
         }
+    }
+}
+
+fn target(place: bool, rotation: bool) -> &'static str {
+    match (place, rotation) {
+        (true, true) => "place and rotation of the target",
+        (true, false) => "the place of the target",
+        _ => "the rotation of the target",
     }
 }
 

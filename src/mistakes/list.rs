@@ -2,16 +2,16 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::Change;
-use super::change::turns;
+use super::change::{Change, turns};
 use super::thinned::{SHIFTS, Thinned};
 use crate::machine::Machine;
-use crate::recording::Measurement;
+use crate::recording::{Header, Measurement, ToolPoint};
 use crate::units::{Quantity, UNITS, Unit};
 
 /// What they are, for a message that none of them fits.
 pub(super) const TRIED: &str = "signs of joints, swapped columns, units, zeros off by 90 or 180 deg, axes of the measured frame, \
-                                sense and order of measured turns, order of rows, rows shifted by up to 3";
+                                sense and order of measured turns, place and rotation of the target, order of rows, \
+                                rows shifted by up to 3, branches exchanged, other machines that come with the program";
 
 /// Every mistake that these recordings may have.
 pub(super) fn changes(machine: &Machine, recordings: &[Thinned]) -> Vec<Change> {
@@ -61,11 +61,39 @@ pub(super) fn changes(machine: &Machine, recordings: &[Thinned]) -> Vec<Change> 
         all.extend([Change::Turn, Change::Inverse]);
         all.extend([true, false].map(|scalar_last| Change::Quaternion { scalar_last }));
     }
+    all.extend(targets(recordings));
+    // Of a single set-up a first joint whose zero is wrong says the same.
+    let known = recordings.iter().any(|r| !r.header.workpiece_frame_unknown);
+    if known && recordings.iter().any(|r| r.header.setup != recordings[0].header.setup) {
+        all.push(Change::Frame);
+    }
     all.push(Change::Backwards);
     let shifts = || (1..=SHIFTS as isize).flat_map(|rows| [rows, -rows]);
     all.extend(shifts().map(Change::Rows));
     all.extend(moving.iter().flat_map(|c| shifts().map(|rows| Change::CommandRows(*c, rows))));
     all
+}
+
+/// What is said of the target on the tool, where it is not left open for each set-up already.
+pub(super) fn targets(recordings: &[Thinned]) -> Vec<Change> {
+    let is = |measurement: Measurement| recordings.iter().all(|r| r.measurement == measurement);
+    let shared = |name: &dyn Fn(&Header) -> Option<String>| {
+        let name = |r: &Thinned| name(&r.header);
+        let elsewhere = |r: &Thinned| {
+            let others = recordings.iter().filter(|o| o.header.setup != r.header.setup);
+            others.map(name).any(|other| other == name(r))
+        };
+        recordings.iter().any(|r| name(r).is_none() || elsewhere(r))
+    };
+    let place = shared(&|header| match &header.tool_point {
+        ToolPoint::Unknown(name) => Some(name.clone()),
+        ToolPoint::Known(_) => None,
+    });
+    let rotation = is(Measurement::Pose) && shared(&|header| header.tool_rotation_unknown.clone());
+    let place = place && (is(Measurement::Pose) || is(Measurement::Position));
+    let all = [(false, true), (true, false), (true, true)];
+    let fits = all.into_iter().filter(|(own, turned)| (place || !own) && (rotation || !turned));
+    fits.map(|(place, rotation)| Change::Target { place, rotation }).collect()
 }
 
 fn pairs(of: &[usize]) -> impl Iterator<Item = (usize, usize)> + '_ {

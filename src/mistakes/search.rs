@@ -1,11 +1,14 @@
 //! Which mistake explains that a machine and recordings do not belong together.
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::Change;
+use super::apart;
+use super::change::Change;
 use super::list::{TRIED, changes};
+use super::nonsense::{Mistake, Nonsense};
+use super::others::{Other, others};
 use super::thinned::Thinned;
+use super::undone::without;
 use crate::error::Result;
 use crate::identify::{CalibrateOptions, Fit, Plausibility, as_declared, calibrate, worst};
 use crate::machine::Machine;
@@ -18,32 +21,6 @@ const ALIKE: f64 = 5.0;
 const BEGUN: usize = 12;
 /// More that cannot be told apart are no name.
 const MOST: usize = 4;
-
-/// What is wrong with a calibration that is nonsense.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Nonsense {
-    /// The worst of what is left over.
-    pub left: Plausibility,
-    /// The mistakes that would explain it, best first; several where the recordings do not tell them apart.
-    pub mistakes: Vec<Mistake>,
-    /// How many were tried, and what.
-    pub tried: usize,
-    /// The kinds that were tried.
-    pub kinds: String,
-}
-
-/// A mistake that would explain recordings.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Mistake {
-    /// Which, as the part of a sentence that follows "with".
-    pub what: String,
-    /// What to do about it.
-    pub mend: String,
-    /// What would be left without it, of the same recording and quantity as [`Nonsense::left`], m or rad.
-    pub left: f64,
-}
 
 /// Calibrates thinned recordings; if the result is nonsense, looks for the mistake.
 ///
@@ -73,7 +50,7 @@ pub fn search(
     progress: &dyn Fn(&str),
 ) -> Result<Option<Nonsense>> {
     let Some(left) = worst(&fit.plausibility).filter(|worst| !worst.holds()).cloned() else {
-        return Ok(None);
+        return apart::search(machine, recordings, fit, progress);
     };
     let thinned = recordings.iter().map(Thinned::of).collect::<Result<Vec<_>>>()?;
     let all = changes(machine, &thinned);
@@ -82,7 +59,7 @@ pub fn search(
     let ones: Vec<Vec<&Change>> = all.iter().map(|change| vec![change]).collect();
     let scored = trial.scored(ones);
     let mut mistakes = trial.named(&scored)?;
-    let mut tried = scored.len();
+    let mut tried = scored.len() + trial.in_place_of_it(&scored, &mut mistakes)?;
     if mistakes.is_empty() {
         progress("looking for two mistakes that explain it");
         let begun = scored.iter().take(BEGUN).enumerate();
@@ -95,7 +72,7 @@ pub fn search(
         mistakes = trial.named(&scored)?;
         tried += scored.len();
     }
-    Ok(Some(Nonsense { left, mistakes, tried, kinds: TRIED.into() }))
+    Ok(Some(Nonsense { left, apart: None, mistakes, tried, kinds: TRIED.into() }))
 }
 
 /// What moves rows takes them from the recording as it is, so it comes first.
@@ -118,14 +95,8 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// The recordings without these mistakes.
     fn without(&self, mistakes: &[&Change]) -> Result<Vec<Recording>> {
-        let one = |thinned: &Thinned| {
-            let mut other = thinned.clone();
-            mistakes.iter().for_each(|change| other.samples = change.applied(&other));
-            other.recording(self.machine)
-        };
-        self.thinned.iter().map(one).collect()
+        without(self.machine, self.thinned, mistakes)
     }
 
     /// The largest residual over what could be true of the recordings as they are: a change of units changes what joints seem to move.
@@ -146,10 +117,51 @@ impl Trial<'_> {
         scored
     }
 
+    /// Adds machines in place of the given one that explain the recordings as well as the best mistakes; such as explain them far better
+    /// stand alone. How many there are.
+    fn in_place_of_it(&self, scored: &Scored, mistakes: &mut Vec<Mistake>) -> Result<usize> {
+        let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
+        let others = others(self.machine);
+        let excess = |other: &Other| {
+            let recordings = other.recordings(self.machine, self.thinned).ok()?;
+            Some(self.excess(&as_declared(&other.machine, &recordings).ok()?))
+        };
+        let best =
+            |other: &Other| excess(other).filter(|own| *own <= 1.0 && ALIKE * own <= self.left.excess());
+        let mut found: Vec<(f64, &Other)> = others
+            .iter()
+            .filter_map(|o| Some((best(o)?, o)))
+            .filter(|(own, _)| *own <= ALIKE * least)
+            .collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if found.first().is_some_and(|(own, _)| ALIKE * own < least) {
+            mistakes.clear();
+        }
+        for (_, other) in found.iter().take(MOST.saturating_sub(mistakes.len())) {
+            let recordings = other.recordings(self.machine, self.thinned)?;
+            let Ok((_, fit)) = calibrate(&other.machine, &recordings, CalibrateOptions::default()) else {
+                continue;
+            };
+            let same = |p: &&Plausibility| {
+                (&p.recording, p.of_angles) == (&self.left.recording, self.left.of_angles)
+            };
+            if let Some(own) = fit.plausibility.iter().find(same) {
+                mistakes.push(Mistake { what: other.what.clone(), mend: other.mend.clone(), left: own.left });
+            }
+        }
+        Ok(others.len())
+    }
+
     /// Those that explain the recordings and cannot be told apart, calibrated without them.
     fn named(&self, scored: &Scored) -> Result<Vec<Mistake>> {
         let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
-        let alike: Vec<_> = scored.iter().take_while(|(excess, _)| *excess <= ALIKE * least).collect();
+        let mut alike: Vec<_> = scored.iter().take_while(|(excess, _)| *excess <= ALIKE * least).collect();
+        // What leaves more of the target open explains no less.
+        let one_is_enough = alike
+            .iter()
+            .any(|(_, own)| matches!(own[..], [Change::Target { place, rotation }] if place != rotation));
+        let open = |change: &&Change| matches!(change, Change::Target { place: true, rotation: true });
+        alike.retain(|(_, own)| !(one_is_enough && own.iter().any(open)));
         let better = least <= 1.0 && ALIKE * least <= self.left.excess();
         let mut named = Vec::new();
         for (_, mistakes) in alike.iter().filter(|_| better && alike.len() <= MOST) {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use crate::error::Result;
 use crate::machine::{JointKind, Machine};
-use crate::recording::{Measurement, Recording, Role};
+use crate::recording::{Header, Measurement, Recording, Role};
 use crate::units::Unit;
 
 /// So many samples of a recording are enough to tell a machine from another.
@@ -16,6 +16,10 @@ pub(super) const SHIFTS: usize = 3;
 /// One sample, m and rad.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
+    /// Where it stands in the file.
+    pub line: u64,
+    /// s, where the recording says.
+    pub time: Option<f64>,
     pub commands: Vec<f64>,
     pub values: Vec<f64>,
 }
@@ -24,15 +28,16 @@ pub(super) struct Sample {
 #[derive(Clone, Debug)]
 pub(super) struct Thinned {
     /// The recording as the user named it.
-    path: String,
+    pub path: String,
     /// Lines of the head that hold whatever the columns say.
-    head: Vec<String>,
+    pub head: Vec<String>,
+    pub header: Header,
     pub measurement: Measurement,
     /// Units in which the file states commands and readings, where it has such columns.
     pub units: Vec<Option<Unit>>,
     pub value_units: Vec<Unit>,
     /// By place in the thinned recording: the sample in the middle and `SHIFTS` neighbours on each side.
-    windows: Vec<Vec<Sample>>,
+    pub windows: Vec<Vec<Sample>>,
     /// The samples that a change works on.
     pub samples: Vec<Sample>,
 }
@@ -57,7 +62,8 @@ impl Thinned {
                 if wanted.contains(&seen) {
                     let row = |all: &[f64], width: usize| all[k * width..(k + 1) * width].to_vec();
                     let (commands, values) = (row(&chunk.commands, commands), row(&chunk.values, values));
-                    known.insert(seen, Sample { commands, values });
+                    let (line, time) = (chunk.lines[k], chunk.time.as_ref().map(|t| t[k]));
+                    known.insert(seen, Sample { line, time, commands, values });
                 }
                 seen += 1;
             }
@@ -71,6 +77,7 @@ impl Thinned {
         Ok(Thinned {
             path: recording.path().to_string_lossy().into_owned(),
             head: lines.filter(|l| l.trim_start().starts_with('#') && !key(l)).map(String::from).collect(),
+            header: recording.header().clone(),
             measurement: recording.header().measurement,
             units: (0..commands).map(|c| unit(Role::Command(c))).collect(),
             value_units: (0..values).filter_map(|i| unit(Role::Value(i))).collect(),
@@ -84,6 +91,17 @@ impl Thinned {
         self.windows
             .iter()
             .map(move |window| &window[SHIFTS.saturating_add_signed(rows).min(window.len() - 1)])
+    }
+
+    /// Its file name.
+    pub fn name(&self) -> String {
+        let name = std::path::Path::new(&self.path).file_name();
+        name.map_or_else(|| self.path.clone(), |name| name.to_string_lossy().into_owned())
+    }
+
+    /// The commands of the rows before the samples, as they were read.
+    pub fn commands_before(&self) -> Vec<Vec<f64>> {
+        self.neighbours(-1).map(|sample| sample.commands.clone()).collect()
     }
 
     /// As a recording again, m and rad.

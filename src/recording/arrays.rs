@@ -146,6 +146,11 @@ impl Arrays {
         self.line(format!("tool_point: unknown {name}"))
     }
 
+    /// How the target of a pose is turned in frame `t` is found with the rest, and shared by recordings that give the same name.
+    pub fn unknown_tool_rotation(self, name: &str) -> Self {
+        self.line(format!("tool_rotation: unknown {name}"))
+    }
+
     /// The fixed point in frame `w`, m; its origin unless told otherwise.
     pub fn workpiece_point(self, p_w: Vec3<f64>) -> Self {
         let [x, y, z] = p_w.0;

@@ -246,6 +246,7 @@ impl Layout {
             ("zero", displacement || matches!(joint, Measurement::Joint { .. })),
             ("nominal_length", distance),
             ("direction", displacement),
+            ("tool_rotation", measured == Measurement::Pose),
         ] {
             if let Some(line) = draft.line_of(key).filter(|_| !has_meaning) {
                 let word = measurement.word();

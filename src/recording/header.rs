@@ -21,6 +21,9 @@ pub struct Header {
     pub workpiece_frame_unknown: bool,
     /// The measured point in frame `t`.
     pub tool_point: ToolPoint,
+    /// Name under which the rotation of a pose's target in frame `t` is to be found; recordings that give the same name share it. `None`:
+    /// the target is turned as frame `t`.
+    pub tool_rotation_unknown: Option<String>,
     /// The fixed point (socket, second ball) in frame `w`, m.
     pub workpiece_point: Vec3<f64>,
     /// Whether the zero of the reference is arbitrary (`joint`, `displacement`).
@@ -112,12 +115,13 @@ pub struct Sigma {
 }
 
 /// Every known key, in the order in which messages list them.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "machine",
     "measurement",
     "setup",
     "nominal_length",
     "tool_point",
+    "tool_rotation",
     "workpiece_point",
     "workpiece_frame",
     "zero",
@@ -160,6 +164,7 @@ impl Draft {
             setup: String::new(),
             workpiece_frame_unknown: false,
             tool_point: ToolPoint::Known(Vec3([0.0; 3])),
+            tool_rotation_unknown: None,
             workpiece_point: Vec3([0.0; 3]),
             zero_unknown: false,
             nominal_length: NominalLength::NotGiven,
@@ -227,6 +232,14 @@ impl Draft {
                 header.nominal_length = NominalLength::Known(entry.positive(entry.unit(&[Length])?)?);
             }
             "tool_point" => header.tool_point = tool_point(entry)?,
+            "tool_rotation" => {
+                entry.no_unit()?;
+                let name = unknown_name(entry).filter(|name| !name.is_empty());
+                let name = name.ok_or_else(|| {
+                    entry.bad_word("`unknown NAME`: recordings that give the same name share the rotation")
+                })?;
+                header.tool_rotation_unknown = Some(name.to_string());
+            }
             "workpiece_point" => header.workpiece_point = entry.vector(Some(entry.unit(&[Length])?))?,
             "workpiece_frame" => header.workpiece_frame_unknown = entry.unknown()?,
             "zero" => header.zero_unknown = entry.unknown()?,
@@ -303,13 +316,17 @@ fn measurement(entry: &Entry) -> Result<Measurement, Fail> {
     })
 }
 
+/// What follows the word `unknown`.
+fn unknown_name<'a>(entry: &Entry<'a>) -> Option<&'a str> {
+    let rest = entry.value.strip_prefix("unknown").filter(|n| n.is_empty() || n.starts_with([' ', '\t']));
+    rest.map(str::trim)
+}
+
 fn tool_point(entry: &Entry) -> Result<ToolPoint, Fail> {
-    let Some(name) =
-        entry.value.strip_prefix("unknown").filter(|n| n.is_empty() || n.starts_with([' ', '\t']))
-    else {
+    let Some(name) = unknown_name(entry) else {
         return Ok(ToolPoint::Known(entry.vector(Some(entry.unit(&[Quantity::Length])?))?));
     };
-    match name.trim() {
+    match name {
         "" => Err(entry.bad_word("`unknown NAME`: recordings that give the same name share the point")),
         name => Ok(ToolPoint::Unknown(name.to_string())),
     }

@@ -135,6 +135,11 @@ pub(super) fn stepped(
     }
     next.set_ups.zeros.iter_mut().enumerate().for_each(|(i, z)| *z += step[places.zero(i)]);
     next.set_ups.lengths.iter_mut().enumerate().for_each(|(i, l)| *l += step[places.length(i)]);
+    for (i, rotation) in next.set_ups.tool_rotations.iter_mut().enumerate() {
+        let at = places.tool_rotation(i);
+        let turn = Vec3([step[at], step[at + 1], step[at + 2]]);
+        *rotation = *rotation * Pose::exp(Twist::new(Vec3([0.0; 3]), turn)).rotation;
+    }
     let (w, t) = (machine.w_index(), machine.t_index());
     if !form.is_global() {
         let moved = |branch: Branch, link: Pose<f64>, d: Twist<f64>| match (form, branch) {

@@ -112,6 +112,7 @@ impl Kalman {
                 dh: vec![Twist::zero(0.0); machine.dyads().len()],
                 frames: Vec::new(),
                 tool_points: Vec::new(),
+                tool_rotations: Vec::new(),
                 zeros: Vec::new(),
                 lengths: Vec::new(),
             },
@@ -285,6 +286,9 @@ impl Kalman {
                 format!("{}{setup}.{}", dyads[self.machine.w_index()].frame, COMPONENTS[k])
             }
             Role::ToolPoint(i) => format!("{}.{}", self.values.tool_points[i].0, ["x", "y", "z"][k]),
+            Role::ToolRotation(i) => {
+                format!("{}.{}", self.values.tool_rotations[i].0, COMPONENTS[3 + k])
+            }
             Role::Zero(i) => format!("zero of {}", self.values.zeros[i].1),
             Role::Length(_) => "length".to_string(),
         };
@@ -315,6 +319,7 @@ impl Kalman {
         let frame = |f: &FrameW| (f.setup.clone(), f.previous_from_w * Pose::exp(f.dh));
         found.setups = self.values.frames.iter().map(frame).collect();
         found.tool_points = self.values.tool_points.clone();
+        found.tool_rotations = self.values.tool_rotations.clone();
         let zero = |(s, c, z): &(String, String, Option<f64>)| Some((s.clone(), c.clone(), (*z)?));
         found.zeros = self.values.zeros.iter().filter_map(zero).collect();
         found.lengths = self.values.lengths.iter().filter_map(|(s, l)| Some((s.clone(), (*l)?))).collect();

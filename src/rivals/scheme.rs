@@ -125,6 +125,10 @@ impl Scheme {
                         if let Some(l) = source.length.unknown() {
                             row[places.length(l)] = -1.0;
                         }
+                        if let Some(r) = source.tool_rotation.unknown() {
+                            let at = places.tool_rotation(r);
+                            row[at..at + 3].copy_from_slice(&reading.by_tool_rotation.0);
+                        }
                         triangle.push(&row, residual);
                     }
                 }

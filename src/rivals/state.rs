@@ -37,7 +37,10 @@ impl State {
             links,
             set_ups: SetUpValues::zero(sources),
         };
-        let given = sources.tool_points.is_empty() && sources.zeros.is_empty() && sources.lengths.is_empty();
+        let given = sources.tool_points.is_empty()
+            && sources.tool_rotations.is_empty()
+            && sources.zeros.is_empty()
+            && sources.lengths.is_empty();
         if given && !sources.frame_unknown.contains(&true) {
             return Ok(state);
         }
@@ -51,6 +54,11 @@ impl State {
         for (i, name) in sources.tool_points.iter().enumerate() {
             state.set_ups.tool_points[i] =
                 placed.tool_points().find(|(known, _)| known == name).map_or(Vec3([0.0; 3]), |p| p.1);
+        }
+        for (i, name) in sources.tool_rotations.iter().enumerate() {
+            if let Some((_, rotation)) = placed.tool_rotations.iter().find(|(known, _)| known == name) {
+                state.set_ups.tool_rotations[i] = *rotation;
+            }
         }
         for (i, (s, of)) in sources.zeros.iter().enumerate() {
             let own = placed.zeros().find(|(setup, known, _)| *setup == sources.setups[*s] && known == of);
@@ -88,6 +96,8 @@ impl State {
         calibrated.setups = (0..sources.setups.len()).map(|s| (setup(s), self.frames_w[s])).collect();
         calibrated.tool_points =
             sources.tool_points.iter().cloned().zip(self.set_ups.tool_points.iter().copied()).collect();
+        calibrated.tool_rotations =
+            sources.tool_rotations.iter().cloned().zip(self.set_ups.tool_rotations.iter().copied()).collect();
         calibrated.zeros = (sources.zeros.iter().zip(&self.set_ups.zeros))
             .map(|((s, of), z)| (setup(*s), of.clone(), *z))
             .collect();

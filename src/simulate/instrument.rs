@@ -58,7 +58,13 @@ impl Instrument {
     /// Both measured points at their frames' origins, length and zero 0, normal noise.
     pub fn new(sensor: Sensor, noise_m: f64, noise_rad: f64) -> Self {
         let origin = Vec3([0.0; 3]);
-        let state = SensorState { tool_point_t: origin, workpiece_point_w: origin, length: 0.0, zero: 0.0 };
+        let state = SensorState {
+            tool_point_t: origin,
+            tool_rotation_t: Mat3::identity(0.0),
+            workpiece_point_w: origin,
+            length: 0.0,
+            zero: 0.0,
+        };
         Instrument {
             sensor,
             state,

@@ -237,7 +237,18 @@ fn calibrate_writes_a_file_that_reads_back() {
     let value = json(&done(&["describe", &ron, "--json", "-"]));
     assert_eq!(
         keys(&value["calibration"]),
-        ["deviations", "lengths", "rms_m", "rms_rad", "samples", "seen", "setups", "tool_points", "zeros"]
+        [
+            "deviations",
+            "lengths",
+            "rms_m",
+            "rms_rad",
+            "samples",
+            "seen",
+            "setups",
+            "tool_points",
+            "tool_rotations",
+            "zeros"
+        ]
     );
     assert_eq!(folder.names(), ["calibrated.ron", "rec.csv"]);
 }

@@ -255,6 +255,14 @@ pub fn is_named(planted: &Planted, said: &Option<Nonsense>) -> bool {
 /// Sound recordings: random errors up to three tolerances, any instrument, noise up to a tolerance, up to 10 % outliers, few samples and
 /// many. Of each whether it was refused, and how near it came: the largest excess.
 pub fn sound(name: &str, draw: u64) -> (Option<Nonsense>, f64) {
+    let (machine, recordings) = (machine(name), [sound_recording(name, draw)]);
+    let said = nonsense(&machine, &recordings, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let (_, fit) = calibrate(&machine, &recordings, CalibrateOptions::default()).expect("sound");
+    (said, fit.plausibility.iter().map(Plausibility::excess).fold(0.0, f64::max))
+}
+
+/// One of them.
+pub fn sound_recording(name: &str, draw: u64) -> Recording {
     let machine = machine(name);
     let mut random = Random::new(draw);
     let kinds = [Sensor::Position, Sensor::Pose, Sensor::Distance { absolute: true }];
@@ -266,10 +274,56 @@ pub fn sound(name: &str, draw: u64) -> (Option<Nonsense>, f64) {
     instrument.outlier = kincal::units::ByQuantity { m: 1.0, rad: 1.0 };
     let samples = random.between(60.0, 400.0) as usize;
     let text = text(&machine, &instrument, random.between(0.0, 3.0), samples, 1000 + draw);
-    let recordings = [read(&text, &machine)];
-    let said = nonsense(&machine, &recordings, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
-    let (_, fit) = calibrate(&machine, &recordings, CalibrateOptions::default()).expect("sound");
-    (said, fit.plausibility.iter().map(Plausibility::excess).fold(0.0, f64::max))
+    read(&text, &machine)
+}
+
+/// A machine of three to seven joints in any order and direction, on either branch, with tolerances of any size.
+pub fn random_machine(random: &mut Random) -> Machine {
+    let mut triple = |reach: f64| {
+        let [x, y, z] = std::array::from_fn(|_| random.between(-reach, reach));
+        format!("({x:.3}, {y:.3}, {z:.3})")
+    };
+    let joint = |i: usize, at: String, rotation: String, kind: f64, axis: f64| {
+        let axis = ["x", "y", "z"][axis as usize];
+        let joint = match kind < 0.6 {
+            true => format!("Revolute(axis: \"{axis}\", travel: (-170, 170))"),
+            false => format!("Prismatic(axis: \"{axis}\", travel: (-300, 300))"),
+        };
+        format!("(frame: \"j{i}\", at: {at}, rotation: {rotation}, joint: {joint}),")
+    };
+    let places: Vec<(String, String)> = (0..7).map(|_| (triple(400.0), triple(90.0))).collect();
+    let (last_w, last_t) = (triple(100.0), triple(100.0));
+    let (joints, on_the_workpiece) = (random.between(3.0, 8.0) as usize, random.between(0.0, 3.0) as usize);
+    let all: Vec<String> = (places.into_iter().take(joints).enumerate())
+        .map(|(i, (at, turn))| joint(i, at, turn, random.between(0.0, 1.0), random.between(0.0, 3.0)))
+        .collect();
+    let (workpiece, tool) = all.split_at(on_the_workpiece);
+    let mut size = |from: f64, to: f64| 10f64.powf(random.between(from.log10(), to.log10()));
+    let (translation, rotation) = (size(0.01, 1.0), size(0.003, 0.2));
+    let text = format!(
+        "Machine(name: \"drawn\", units: (length: mm, angle: deg), tolerance: (translation: {translation}, rotation: {rotation}), \
+         workpiece: [{} (frame: \"w\", at: {last_w})], tool: [{} (frame: \"t\", at: {last_t})])",
+        workpiece.concat(),
+        tool.concat()
+    );
+    Machine::parse("drawn.ron", &text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Whether a machine that is drawn, with deviations of 1 to 30 tolerances, is found to the noise; else what it was.
+pub fn drawn(draw: u64) -> Result<(), String> {
+    let mut random = Random::new(draw);
+    let machine = random_machine(&mut random);
+    let sensor = if draw.is_multiple_of(2) { Sensor::Position } else { Sensor::Pose };
+    let size = 30f64.powf(random.between(0.0, 1.0));
+    let text = text(&machine, &Instrument::new(sensor.clone(), 1e-6, 5e-6), size, 120, draw);
+    let (_, fit) = calibrate(&machine, &[read(&text, &machine)], CalibrateOptions::default())
+        .map_err(|e| format!("draw {draw}: {e}"))?;
+    let left = fit.rms.m.expect("positions").geometric;
+    if left < 3e-6 {
+        Ok(())
+    } else {
+        Err(format!("draw {draw}: {sensor:?}, {size:.1} tolerances: {left:.2e} m"))
+    }
 }
 
 /// RMS of positions that a calibration leaves where deviations are so many times the tolerances, m, and what is to be careful about.

@@ -16,6 +16,7 @@ mod instrument_noise;
 mod location;
 mod machinist;
 mod mistakes;
+mod mounted;
 mod names;
 mod paper;
 mod pieces;

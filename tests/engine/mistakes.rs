@@ -1,6 +1,6 @@
 //! Calibrations that are nonsense are told, the mistake is named, and nothing is said of sound recordings.
 
-use crate::common::planted::{PLANTED, far, is_named, said_of, sound};
+use crate::common::planted::{PLANTED, drawn, far, is_named, said_of, sound};
 use crate::common::{machine, machines};
 use kincal::sensor::Sensor;
 
@@ -50,6 +50,12 @@ fn deviations_far_beyond_the_tolerances_are_found_and_told() {
         warnings.iter().any(|w| w.contains("tolerances from where the machine file has it")),
         "{warnings:?}"
     );
+}
+
+#[test]
+fn machines_that_are_drawn_are_found_from_afar() {
+    let missed: Vec<String> = (0..12).filter_map(|draw| drawn(draw).err()).collect();
+    assert!(missed.is_empty(), "{missed:#?}");
 }
 
 #[test]

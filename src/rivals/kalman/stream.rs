@@ -4,7 +4,7 @@ use super::unknowns::{Block, FrameW, Opened, Role};
 use super::{Kalman, Stream};
 use crate::error::{Error, Result};
 use crate::identify::{Known, channel};
-use crate::lie::Twist;
+use crate::lie::{Mat3, Twist};
 use crate::machine::{JointKind, Tolerance};
 use crate::recording::{Header, NominalLength, ToolPoint};
 use crate::sensor::Sensor;
@@ -47,6 +47,25 @@ impl Kalman {
                 })
             }
         };
+        let tool_rotation = match &header.tool_rotation_unknown {
+            Some(name) if sensor == Sensor::Pose => {
+                let own = self.values.tool_rotations.iter().position(|(known, _)| known == name);
+                Known::Unknown(match own {
+                    Some(i) => i,
+                    None => {
+                        let known = self.known.as_ref();
+                        let known = known.and_then(|k| k.tool_rotations.iter().find(|p| p.0 == *name));
+                        let start =
+                            known.ok_or_else(|| no_start(&format!("the rotation of target \"{name}\"")))?.1;
+                        self.values.tool_rotations.push((name.clone(), start));
+                        let i = self.values.tool_rotations.len() - 1;
+                        self.grow(Role::ToolRotation(i), vec![rotation; 3]);
+                        i
+                    }
+                })
+            }
+            _ => Known::Value(Mat3::identity(0.0)),
+        };
         let mut zero = Known::Value(0.0);
         if header.zero_unknown && sensor.has_zero() {
             let key = (header.setup.clone(), channel(&sensor, &self.machine));
@@ -73,7 +92,9 @@ impl Kalman {
             _ => Known::Value(0.0),
         };
         let workpiece_point = header.workpiece_point;
-        self.streams.push(Opened { sensor, frame, tool_point, workpiece_point, zero, length, sigmas });
+        let opened =
+            Opened { sensor, frame, tool_point, tool_rotation, workpiece_point, zero, length, sigmas };
+        self.streams.push(opened);
         Ok(Stream(self.streams.len() - 1))
     }
 

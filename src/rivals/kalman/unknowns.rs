@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Kalman;
 use crate::chain::{Chain, deviation_jacobian};
 use crate::identify::Known;
-use crate::lie::{Pose, Twist, Vec3};
+use crate::lie::{Mat3, Pose, Twist, Vec3};
 use crate::rivals::scheme::measured_rotation;
 use crate::sensor::{Sensor, SensorState};
 
@@ -15,6 +15,7 @@ pub(super) enum Role {
     Dyad(usize),
     Frame(usize),
     ToolPoint(usize),
+    ToolRotation(usize),
     Zero(usize),
     Length(usize),
 }
@@ -41,6 +42,7 @@ pub(super) struct Values {
     pub dh: Vec<Twist<f64>>,
     pub frames: Vec<FrameW>,
     pub tool_points: Vec<(String, Vec3<f64>)>,
+    pub tool_rotations: Vec<(String, Mat3<f64>)>,
     /// Set-up, channel, value; `None` until the first reading.
     pub zeros: Vec<(String, String, Option<f64>)>,
     pub lengths: Vec<(String, Option<f64>)>,
@@ -52,6 +54,7 @@ pub(super) struct Opened {
     pub sensor: Sensor,
     pub frame: usize,
     pub tool_point: Known<Vec3<f64>>,
+    pub tool_rotation: Known<Mat3<f64>>,
     pub workpiece_point: Vec3<f64>,
     pub zero: Known<f64>,
     pub length: Known<f64>,
@@ -70,6 +73,11 @@ impl Kalman {
                 Role::Frame(i) => next.frames[i].dh = next.frames[i].dh + twist(),
                 Role::ToolPoint(i) => {
                     next.tool_points[i].1 = next.tool_points[i].1 + Vec3(std::array::from_fn(at));
+                }
+                Role::ToolRotation(i) => {
+                    let turn = Twist::new(Vec3([0.0; 3]), Vec3(std::array::from_fn(at)));
+                    let rotation = &mut next.tool_rotations[i].1;
+                    *rotation = *rotation * Pose::exp(turn).rotation;
                 }
                 Role::Zero(i) => next.zeros[i].2 = next.zeros[i].2.map(|z| z + at(0)),
                 Role::Length(i) => next.lengths[i].1 = next.lengths[i].1.map(|l| l + at(0)),
@@ -124,6 +132,10 @@ impl Kalman {
                 Known::Value(at) => at,
                 Known::Unknown(i) => values.tool_points[i].1,
             },
+            tool_rotation_t: match opened.tool_rotation {
+                Known::Value(rotation) => rotation,
+                Known::Unknown(i) => values.tool_rotations[i].1,
+            },
             workpiece_point_w: opened.workpiece_point,
             length: match opened.length {
                 Known::Value(length) => length,
@@ -150,6 +162,9 @@ impl Kalman {
             }
             if let Some(p) = opened.tool_point.unknown() {
                 put(i, Role::ToolPoint(p), &reading.by_tool_point_t.0);
+            }
+            if let Some(r) = opened.tool_rotation.unknown() {
+                put(i, Role::ToolRotation(r), &reading.by_tool_rotation.0);
             }
             if let Some(z) = opened.zero.unknown() {
                 put(i, Role::Zero(z), &[1.0]);
