@@ -30,9 +30,6 @@ pub struct UnnamedPart {
     pub at: String,
     /// What it depends on: `position of c`, `direction of c`, `time`.
     pub depends_on: Vec<String>,
-    /// The family whose law fits best, where that is better than a free function.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub looks_like: Option<String>,
     /// What it makes of the readings.
     #[serde(flatten, with = "rms")]
     pub rms: ByQuantity<Option<f64>>,
@@ -48,11 +45,16 @@ const MOST: usize = 8;
 /// So many hypotheses are held against stretches left out before it is said that nothing more is foretold.
 const TRIES: usize = 6;
 
-/// Candidates without a name, beside those of a search.
+/// Whether stretches that were left out are foretold better with term `i` of these, by more than one standard error of that.
+fn is_foretold(search: &Search, all: &[ModelTerm], i: usize) -> bool {
+    folds::gain(search, all, i).is_some_and(|(gain, error)| gain > error)
+}
+
+/// Free functions as candidates, beside the families of a search: what is no name for all that is there may be one for a part of it.
 pub(super) struct Unnamed {
     library: Library,
     candidates: Vec<Candidate>,
-    /// The first of them that has no name.
+    /// The first of them that is a free function.
     first: usize,
     coarse: Coarse,
 }
@@ -92,40 +94,36 @@ impl Unnamed {
         }
     }
 
-    /// The library of a candidate.
-    fn library_of<'l>(&'l self, term: &ModelTerm, named: &'l Library) -> &'l Library {
-        if term.candidate < self.first { named } else { &self.library }
-    }
-
-    /// The parts that what was found leaves to be modelled, and those that only can be told. `search`: with these candidates.
+    /// The parts that what was found leaves to be modelled; where there are none, the likeliest one, that can only be told. `search`: with
+    /// these candidates.
     pub fn parts(&self, search: &Search, in_model: &[ModelTerm]) -> (Vec<ModelTerm>, Option<ModelTerm>) {
-        let mut all = in_model.to_vec();
+        let (mut all, first) = (in_model.to_vec(), in_model.len());
         let mut told = None;
         let mut open: Vec<usize> = (0..self.candidates.len()).filter(|c| !search.is_event(*c)).collect();
-        while all.len() - in_model.len() < MOST {
-            (search.progress)(&format!(
-                "modelling what has no name, part {}",
-                all.len() - in_model.len() + 1
-            ));
+        while all.len() - first < MOST {
+            (search.progress)(&format!("modelling what has no name, part {}", all.len() - first + 1));
             let marginal = Arc::new(search.beside_names(&all));
             let hypotheses = search.compare(marginal.clone(), Some(&open));
+            let likely = hypotheses.iter().filter(|h| h.weight > ENTER).take(TRIES);
             let mut next = None;
-            for hypothesis in hypotheses.iter().filter(|h| h.weight > ENTER).take(TRIES) {
-                let Some(term) = search.enter_bare(hypothesis, &marginal) else { continue };
-                let with: Vec<ModelTerm> = all.iter().cloned().chain([term.clone()]).collect();
-                if folds::gain(search, &with, all.len()).is_some_and(|(gain, error)| gain > error) {
+            for term in likely.filter_map(|hypothesis| search.enter_bare(hypothesis, &marginal)) {
+                let with = [all.as_slice(), std::slice::from_ref(&term)].concat();
+                if is_foretold(search, &with, all.len()) {
                     next = Some(term);
                     break;
                 }
-                open.retain(|c| *c != hypothesis.candidate);
+                // What fails now is not asked again.
+                open.retain(|candidate| *candidate != term.candidate);
                 told = told.or(Some(term));
             }
-            match next {
-                Some(term) => all.push(term),
-                None => break,
-            }
+            let Some(term) = next else { break };
+            all.push(term);
         }
-        let parts = all.split_off(in_model.len());
+        // What came later may say what was said before.
+        while let Some(i) = (first..all.len()).find(|i| !is_foretold(search, &all, *i)) {
+            all.remove(i);
+        }
+        let parts = all.split_off(first);
         let told = told.filter(|_| parts.is_empty());
         (parts, told)
     }
@@ -142,7 +140,7 @@ impl Unnamed {
         let model = Model::new(search, all);
         let one = |i: usize| {
             let (term, candidate) = (&all[i], &search.candidates[all[i].candidate]);
-            let library = self.library_of(term, library);
+            let library = if term.candidate < self.first { library } else { &self.library };
             let solved = model.effect(search, all, i, shares.departure());
             let identified = solved.identified(candidate, library, term.score.parameters.clone());
             let sizes = identified.sizes(&search.rows.linear.samples);
@@ -153,22 +151,9 @@ impl Unnamed {
                     .filter(|made| !made.is_empty())
                     .and_then(|made| rms_of(search, made, quantity == Quantity::Angle))
             };
-            let mut depends_on: Vec<String> = Vec::new();
-            for feature in &candidate.features[..] {
-                for on in feature.depends_on() {
-                    let text = match on {
-                        Dependence::Joint(what, j) => format!("{what} of {}", Place::Joint(j).name(machine)),
-                        Dependence::Other(what) => what,
-                    };
-                    if !depends_on.contains(&text) {
-                        depends_on.push(text);
-                    }
-                }
-            }
             let part = UnnamedPart {
                 at: candidate.place.name(machine),
-                depends_on,
-                looks_like: (term.candidate < self.first).then(|| candidate.told_as.clone()),
+                depends_on: depends_on(term, candidate, machine),
                 rms: ByQuantity::of(of),
                 held_out_rms: folds::pair(search, all, i),
                 modelled,
@@ -177,4 +162,20 @@ impl Unnamed {
         };
         (first..all.len()).map(one).collect()
     }
+}
+
+/// What the features of a candidate that take part depend on, in words.
+fn depends_on(term: &ModelTerm, candidate: &Candidate, machine: &Machine) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    let parts = candidate.coefficients[..term.score.coefficients].iter().flat_map(|c| &c.parts);
+    for on in parts.flat_map(|part| candidate.features[part.feature].depends_on()) {
+        let text = match on {
+            Dependence::Joint(what, j) => format!("{what} of {}", Place::Joint(j).name(machine)),
+            Dependence::Other(what) => what,
+        };
+        if !all.contains(&text) {
+            all.push(text);
+        }
+    }
+    all
 }
