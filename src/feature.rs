@@ -12,6 +12,7 @@
 
 mod bind;
 mod check;
+mod dependence;
 mod dimension;
 mod evaluate;
 mod express;
@@ -24,6 +25,7 @@ mod weights;
 
 pub use bind::{Binding, Feature, Unbound};
 pub use check::{DimensionFault, Scope, dimension_of};
+pub(crate) use dependence::Dependence;
 pub use dimension::Dimension;
 pub use evaluate::Memory;
 pub use expression::Expression;

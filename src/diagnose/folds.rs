@@ -33,6 +33,40 @@ pub(super) fn fill(search: &Search, told: &[ModelTerm], diagnosis: &mut Diagnosi
     }
 }
 
+/// Held-out figures of effect `i` of these.
+pub(super) fn pair(search: &Search, told: &[ModelTerm], i: usize) -> ByQuantity<Option<HeldOutPair>> {
+    let Some(folds) = Folds::new(search, told) else { return ByQuantity::default() };
+    let before = folds.left_out(search, &|effect| effect != i);
+    let after = folds.left_out(search, &|_| true);
+    ByQuantity::of(|quantity| {
+        let rms = |left: &[f64]| rms_of(search, left, quantity == Quantity::Angle);
+        Some(HeldOutPair { before: rms(&before)?, after: rms(&after)? })
+    })
+}
+
+/// By how much the whitened squares of stretches that are left out fall with effect `i`, and the standard error of that, from how much the
+/// stretches differ. `None` where there are too few rows.
+pub(super) fn gain(search: &Search, in_model: &[ModelTerm], i: usize) -> Option<(f64, f64)> {
+    let folds = Folds::new(search, in_model)?;
+    let white = |takes: &dyn Fn(usize) -> bool| {
+        let left = folds.left_out(search, takes);
+        let mut white = vec![0.0; left.len()];
+        search.rows.whitener.apply(&left, &mut white);
+        white
+    };
+    let (without, with) = (white(&|effect| effect != i), white(&|_| true));
+    let mut cells = Vec::new();
+    for span in &search.rows.linear.spans {
+        for fold in 0..FOLDS {
+            let rows = (span.rows.0..span.rows.1).filter(|row| folds.owner[*row] == fold);
+            cells.push(rows.map(|row| without[row] * without[row] - with[row] * with[row]).sum::<f64>());
+        }
+    }
+    let (count, sum) = (cells.len() as f64, cells.iter().sum::<f64>());
+    let spread = cells.iter().map(|x| (x - sum / count).powi(2)).sum::<f64>() / (count - 1.0);
+    Some((sum, (count * spread).sqrt()))
+}
+
 /// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
 /// `Σ_f (e_f - r_f)·r_f - p`, (67), and the standard deviation of that by chance. `None` where there are too few rows.
 pub(super) fn surprise(search: &Search, in_model: &[ModelTerm]) -> Option<(f64, f64)> {

@@ -13,6 +13,7 @@ use super::odds::{Odds, confusable, odds, trust};
 use super::orders;
 use super::outbid::outbid;
 use super::outliers;
+use super::parts::{Unnamed, UnnamedPart};
 use super::placebo::{Placebo, placebo};
 use super::search::{Hypothesis, ModelTerm, Search, all_but};
 use super::series::Standing;
@@ -24,7 +25,7 @@ use super::stretch::wheres;
 use super::traces::{self, Traces};
 use super::unexplained::{self, Unexplained};
 use super::whereabouts::{standing, whereabouts};
-use crate::effects::{Library, Place, in_words};
+use crate::effects::{Library, Place, RecordingFacts, in_words};
 use crate::feature::Dimension;
 use crate::machine::Machine;
 use crate::units::{ByQuantity, Quantity};
@@ -66,15 +67,14 @@ pub(super) fn residual_of(search: &Search, in_model: &[ModelTerm]) -> Vec<f64> {
 pub(super) fn report(
     search: &Search,
     in_model: &[ModelTerm],
-    machine: &Machine,
-    library: &Library,
+    (machine, library, facts): (&Machine, &Library, &RecordingFacts),
     noise: &[Noise],
 ) -> Diagnosis {
     let linear = search.rows.linear;
     let shares = search.shares(in_model);
     let mut doubt = match doubt(search, in_model, machine, &shares, noise) {
         Some(Doubt { but: Some(i), .. }) => {
-            return report(search, &in_model[i..=i], machine, library, noise);
+            return report(search, &in_model[i..=i], (machine, library, facts), noise);
         }
         doubt => doubt,
     };
@@ -118,15 +118,34 @@ pub(super) fn report(
     let mut all: Vec<_> = told.into_iter().zip(placebos).collect();
     all.sort_by(|(a, _), (b, _)| b.1.delta_bic.total_cmp(&a.1.delta_bic));
     let (told, placebos): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-    let unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
+    let mut unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
     let kept: Vec<ModelTerm> = told.iter().map(|(i, ..)| in_model[*i].clone()).collect();
-    let left_over = residual_of(search, &kept);
     let companions = shared::companions(search, library, &kept);
     let in_model = [kept.as_slice(), &companions].concat();
+    // What has no name is modelled all the same.
+    let unnamed = unexplained.as_ref().map(|_| Unnamed::beside(search, machine, facts));
+    let wide = unnamed.as_ref().map(|unnamed| unnamed.rows(search));
+    let wide = unnamed.as_ref().zip(wide.as_ref()).map(|(unnamed, rows)| unnamed.search(search, rows));
+    let search = wide.as_ref().unwrap_or(search);
+    let (mut parts, mut of_parts) = (Vec::new(), Vec::new());
+    if let Some((unnamed, unexplained)) = unnamed.as_ref().zip(unexplained.as_mut()) {
+        let (modelled, only_told) = unnamed.parts(search, &in_model);
+        let all = [in_model.as_slice(), &modelled, only_told.as_slice()].concat();
+        let described =
+            unnamed.told(search, (&all, in_model.len()), &shares, (machine, library), only_told.is_none());
+        let (told, named): (Vec<UnnamedPart>, Vec<Named>) = described.into_iter().unzip();
+        unexplained.take(told);
+        if only_told.is_none() {
+            (parts, of_parts) = (modelled, named);
+        }
+    }
+    let left_over = residual_of(search, &[kept.as_slice(), &parts].concat());
+    let in_model = [in_model.as_slice(), &parts].concat();
     let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
     let (findings, mut named): (Vec<Finding>, Vec<Named>) =
         told.into_iter().map(|(_, finding, named)| (finding, named)).unzip();
     named.extend(shared::named(search, (machine, library), &kept, &companions));
+    named.extend(of_parts);
     let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
         recordings: linear.spans.iter().map(|s| s.label.clone()).collect(),
@@ -334,7 +353,7 @@ fn unexplained(search: &Search, machine: &Machine, noise: &[Noise], doubt: &Doub
     for gathering in &gathers {
         explanation += &format!("; {}", gathering.in_words());
     }
-    Unexplained { rms_m, at, goes_with, r#where, gathers, explanation }
+    Unexplained { rms_m, at, goes_with, r#where, gathers, parts: Vec::new(), explanation }
 }
 
 /// Standard deviation of the noise of lengths (m) or angles (rad), where such were read.

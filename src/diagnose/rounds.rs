@@ -112,7 +112,7 @@ impl Case<'_> {
             }
             let judged = judge(&in_model);
             let report = |search: &Search, in_model: &[ModelTerm]| -> Told {
-                let diagnosis = report::report(search, in_model, machine, library, &noise);
+                let diagnosis = report::report(search, in_model, (machine, library, facts), &noise);
                 Told { diagnosis, may_be_late: lag::may_be_late(search, in_model) }
             };
             if moves < MOVES && !in_model.is_empty() {

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::parts::UnnamedPart;
 use super::search::Search;
 use super::stretch::{Where, wheres};
 use crate::machine::{JointKind, Machine};
@@ -21,8 +22,28 @@ pub struct Unexplained {
     pub r#where: Vec<Where>,
     /// Stretches of travel in which it gathers, the most telling first; none where it is everywhere alike.
     pub gathers: Vec<Gathering>,
+    /// Parts of it that are known by place and by what they depend on, the largest first; the model has those that foretell stretches left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<UnnamedPart>,
     /// In a sentence.
     pub explanation: String,
+}
+
+impl Unexplained {
+    /// With its parts, in any order; the largest says where it is.
+    pub(super) fn take(&mut self, mut parts: Vec<UnnamedPart>) {
+        let size = |part: &UnnamedPart| part.rms.m.or(part.rms.rad).unwrap_or(0.0);
+        parts.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        if let Some(first) = parts.first().filter(|first| first.modelled && first.at != self.at) {
+            self.explanation = self.explanation.replacen(
+                &format!("it fits best at {}", self.at),
+                &format!("most of it is at {}", first.at),
+                1,
+            );
+            (self.at, self.goes_with) = (first.at.clone(), None);
+        }
+        self.parts = parts;
+    }
 }
 
 /// A stretch of a joint's travel that holds more of the misfit than of the samples.

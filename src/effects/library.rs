@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 
 /// The library that comes with the crate.
 const STANDARD: &str = include_str!("library.ron");
+const UNNAMED: &str = include_str!("unnamed.ron");
 /// Where the form of a library is taught.
 const GUIDE: &str = "docs/effects.md shows the form of a library of effects";
 
@@ -46,6 +47,12 @@ impl Library {
         let none = Library { families: Vec::new(), added: 0 };
         let read = none.with_text("library.ron", STANDARD).expect("a test reads the standard library");
         Library { added: 0, ..read }
+    }
+
+    /// Functions of what a place knows that stand for what has no name.
+    pub(crate) fn unnamed() -> Self {
+        let none = Library { families: Vec::new(), added: 0 };
+        none.with_text("unnamed.ron", UNNAMED).expect("a test reads it")
     }
 
     /// This library with the families of a file added; those whose name it has already are replaced.

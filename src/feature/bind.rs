@@ -405,7 +405,7 @@ fn any(node: &Node, condition: &dyn Fn(&Node) -> bool) -> bool {
     condition(node) || parts(node).into_iter().any(|part| any(part, condition))
 }
 
-fn each(node: &Node, look: &mut dyn FnMut(&Node)) {
+pub(super) fn each(node: &Node, look: &mut dyn FnMut(&Node)) {
     look(node);
     parts(node).into_iter().for_each(|part| each(part, look));
 }

@@ -1,0 +1,181 @@
+//! What has no name is modelled all the same: parts of it, each with a place and with what it depends on, `docs/diagnosis-method.md` (81).
+//!
+//! Where the names do not explain what is there, free functions of what each place knows compete with the families by their evidence, one
+//! part after the other. A part stays in the model if stretches that were left out are foretold better with it.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::coarse::Coarse;
+use super::diagnosis::{Named, rms_of};
+use super::finding::HeldOutPair;
+use super::folds;
+use super::held_out::Model;
+use super::score::Rows;
+use super::search::{ENTER, ModelTerm, Search};
+use super::shares::Shares;
+use crate::effects::{Candidate, Library, Place, RecordingFacts};
+use crate::feature::Dependence;
+use crate::machine::Machine;
+use crate::units::{ByQuantity, Quantity, field_by_quantity};
+
+field_by_quantity!(rms, held_out_rms);
+
+/// A part of what no family explains.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct UnnamedPart {
+    /// Joint, frame or `measurement`.
+    pub at: String,
+    /// What it depends on: `position of c`, `direction of c`, `time`.
+    pub depends_on: Vec<String>,
+    /// What it makes of the readings.
+    #[serde(flatten, with = "rms")]
+    pub rms: ByQuantity<Option<f64>>,
+    /// RMS on stretches that were left out, the other parts taken in.
+    #[serde(flatten, with = "held_out_rms")]
+    pub held_out_rms: ByQuantity<Option<HeldOutPair>>,
+    /// Whether the model has it.
+    pub modelled: bool,
+}
+
+/// More parts are not looked for.
+const MOST: usize = 8;
+/// So many hypotheses are held against stretches left out before it is said that nothing more is foretold.
+const TRIES: usize = 6;
+
+/// Whether stretches that were left out are foretold better with term `i` of these, by more than one standard error of that.
+fn is_foretold(search: &Search, all: &[ModelTerm], i: usize) -> bool {
+    folds::gain(search, all, i).is_some_and(|(gain, error)| gain > error)
+}
+
+/// Free functions as candidates, beside the families of a search: what is no name for all that is there may be one for a part of it.
+pub(super) struct Unnamed {
+    library: Library,
+    candidates: Vec<Candidate>,
+    /// The first of them that is a free function.
+    first: usize,
+    coarse: Coarse,
+}
+
+impl Unnamed {
+    pub fn beside(search: &Search, machine: &Machine, facts: &RecordingFacts) -> Self {
+        let library = Library::unnamed();
+        let mut candidates = search.candidates.to_vec();
+        let first = candidates.len();
+        candidates.extend(library.candidates(machine, facts).all);
+        let coarse = Coarse::new(search.rows.linear, candidates.len());
+        Unnamed { library, candidates, first, coarse }
+    }
+
+    /// The rows of a search, for these candidates.
+    pub fn rows<'a>(&'a self, search: &Search<'a>) -> Rows<'a> {
+        Rows::new(search.rows.linear, &self.coarse, search.rows.whitener.clone())
+    }
+
+    /// The search with these candidates.
+    pub fn search<'a>(&'a self, search: &Search<'a>, rows: &'a Rows<'a>) -> Search<'a> {
+        let total: f64 = self.candidates.iter().map(|c| c.often).sum();
+        let mut commonness = search.commonness.clone();
+        commonness.resize(self.candidates.len(), 0.0);
+        Search {
+            rows,
+            runs: search.runs,
+            base: search.base.clone(),
+            candidates: &self.candidates,
+            priors: self.candidates.iter().map(|c| (c.often / total).ln()).collect(),
+            commonness,
+            progress: search.progress,
+            overdispersion: search.overdispersion,
+            in_motion: search.in_motion,
+            known: Default::default(),
+            grounds: Default::default(),
+        }
+    }
+
+    /// The parts that what was found leaves to be modelled; where there are none, the likeliest one, that can only be told. `search`: with
+    /// these candidates.
+    pub fn parts(&self, search: &Search, in_model: &[ModelTerm]) -> (Vec<ModelTerm>, Option<ModelTerm>) {
+        let (mut all, first) = (in_model.to_vec(), in_model.len());
+        let mut told = None;
+        let mut open: Vec<usize> = (0..self.candidates.len()).filter(|c| !search.is_event(*c)).collect();
+        while all.len() - first < MOST {
+            (search.progress)(&format!("modelling what has no name, part {}", all.len() - first + 1));
+            let marginal = Arc::new(search.beside_names(&all));
+            let hypotheses = search.compare(marginal.clone(), Some(&open));
+            let likely = hypotheses.iter().filter(|h| h.weight > ENTER).take(TRIES);
+            let mut next = None;
+            for term in likely.filter_map(|hypothesis| search.enter_bare(hypothesis, &marginal)) {
+                let with = [all.as_slice(), std::slice::from_ref(&term)].concat();
+                if is_foretold(search, &with, all.len()) {
+                    next = Some(term);
+                    break;
+                }
+                // What fails now is not asked again.
+                open.retain(|candidate| *candidate != term.candidate);
+                told = told.or(Some(term));
+            }
+            let Some(term) = next else { break };
+            all.push(term);
+        }
+        // What came later may say what was said before.
+        while let Some(i) = (first..all.len()).find(|i| !is_foretold(search, &all, *i)) {
+            all.remove(i);
+        }
+        let parts = all.split_off(first);
+        let told = told.filter(|_| parts.is_empty());
+        (parts, told)
+    }
+
+    /// The parts among `all`, from `first` on, as they are told and as they are put into the model.
+    pub fn told(
+        &self,
+        search: &Search,
+        (all, first): (&[ModelTerm], usize),
+        shares: &Shares,
+        (machine, library): (&Machine, &Library),
+        modelled: bool,
+    ) -> Vec<(UnnamedPart, Named)> {
+        let model = Model::new(search, all);
+        let one = |i: usize| {
+            let (term, candidate) = (&all[i], &search.candidates[all[i].candidate]);
+            let library = if term.candidate < self.first { library } else { &self.library };
+            let solved = model.effect(search, all, i, shares.departure());
+            let identified = solved.identified(candidate, library, term.score.parameters.clone());
+            let sizes = identified.sizes(&search.rows.linear.samples);
+            let named = Named { effect: identified.stored(machine, &sizes), scales: term.scales(search) };
+            let made = model.made(search, all, i).unwrap_or_default();
+            let of = |quantity: Quantity| {
+                Some(&made)
+                    .filter(|made| !made.is_empty())
+                    .and_then(|made| rms_of(search, made, quantity == Quantity::Angle))
+            };
+            let part = UnnamedPart {
+                at: candidate.place.name(machine),
+                depends_on: depends_on(term, candidate, machine),
+                rms: ByQuantity::of(of),
+                held_out_rms: folds::pair(search, all, i),
+                modelled,
+            };
+            (part, named)
+        };
+        (first..all.len()).map(one).collect()
+    }
+}
+
+/// What the features of a candidate that take part depend on, in words.
+fn depends_on(term: &ModelTerm, candidate: &Candidate, machine: &Machine) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    let parts = candidate.coefficients[..term.score.coefficients].iter().flat_map(|c| &c.parts);
+    for on in parts.flat_map(|part| candidate.features[part.feature].depends_on()) {
+        let text = match on {
+            Dependence::Joint(what, j) => format!("{what} of {}", Place::Joint(j).name(machine)),
+            Dependence::Other(what) => what,
+        };
+        if !all.contains(&text) {
+            all.push(text);
+        }
+    }
+    all
+}

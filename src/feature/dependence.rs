@@ -1,0 +1,48 @@
+//! What a feature depends on, in words.
+
+use super::bind::{Feature, each};
+use super::node::{Column, Node};
+
+/// Something that a feature depends on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Dependence {
+    /// What of the joint of a dyad: its `position`, `direction`, `velocity`, `acceleration`, or the `weight` on it.
+    Joint(&'static str, usize),
+    /// The time, the order of samples, or a channel by name.
+    Other(String),
+}
+
+impl Feature {
+    /// What it depends on, in the order in which it is written; each once.
+    pub(crate) fn depends_on(&self) -> Vec<Dependence> {
+        let mut all: Vec<Dependence> = Vec::new();
+        each(&self.node, &mut |node| {
+            let on = match node {
+                Node::Joint(j, column) => Dependence::Joint(of_column(*column), *j),
+                Node::Late(j, _) => Dependence::Joint("position", *j),
+                // Where it stands between its stops, or how far it has been taken up, follows from which way the joint came.
+                Node::Play { joint, .. } | Node::TakeUp { joint, .. } => {
+                    Dependence::Joint("direction", *joint)
+                }
+                Node::Time(_) | Node::Lag { .. } => Dependence::Other("time".into()),
+                Node::Order(..) => Dependence::Other("order of samples".into()),
+                Node::Channel(name, _) => Dependence::Other(name.clone()),
+                _ => return,
+            };
+            if !all.contains(&on) {
+                all.push(on);
+            }
+        });
+        all
+    }
+}
+
+fn of_column(column: Column) -> &'static str {
+    match column {
+        Column::Position => "position",
+        Column::Direction | Column::SinceReversal | Column::Travelled => "direction",
+        Column::Velocity => "velocity",
+        Column::Acceleration => "acceleration",
+        Column::Gravity | Column::Load | Column::Weight(_) => "weight",
+    }
+}
