@@ -30,14 +30,14 @@ pub struct Unexplained {
 }
 
 impl Unexplained {
-    /// With its parts, in any order; the largest says where it is.
+    /// With its parts, in any order. What a joint or frame foretells is not the instrument's: the largest part then says where it is.
     pub(super) fn take(&mut self, mut parts: Vec<UnnamedPart>) {
         let size = |part: &UnnamedPart| part.rms.m.or(part.rms.rad).unwrap_or(0.0);
         parts.sort_by(|a, b| size(b).total_cmp(&size(a)));
-        if let Some(first) = parts.first().filter(|first| first.modelled && first.at != self.at) {
+        if let Some(first) = parts.first().filter(|first| first.modelled && self.at == MEASUREMENT) {
             self.explanation = self.explanation.replacen(
-                &format!("it fits best at {}", self.at),
-                &format!("most of it is at {}", first.at),
+                &format!("it fits best at {MEASUREMENT}"),
+                &format!("what is foretold of it is at {} for the most part", first.at),
                 1,
             );
             (self.at, self.goes_with) = (first.at.clone(), None);
@@ -67,6 +67,8 @@ pub struct Gathering {
     pub share_of_samples: f64,
 }
 
+/// The place that stands for the instrument.
+const MEASUREMENT: &str = "measurement";
 /// So many rows in a row tell how large the misfit is around them.
 const BLOCK: usize = 16;
 /// Parts of a joint's travel.

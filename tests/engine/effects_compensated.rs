@@ -205,13 +205,9 @@ fn what_a_program_says_nothing_of_is_left_out_of_its_correction_and_told() {
     assert!((gaps(1) - 25e-6).abs() < 1e-6 && gaps(0) < 1e-9, "{:e} {:e}", gaps(0), gaps(1));
 }
 
-/// From a recording of so many samples.
-fn a_mill_is_diagnosed_and_corrected(samples: usize) {
-    let machine = common::machine("xyz_mill");
-    let truth = erroneous(&machine, Vec::new());
-    let recordings = [measured(&truth, &path(samples, LEARNT), 2e-7)];
+/// The library with these families alone.
+fn only(kept: &[&str]) -> Library {
     let mut library = Library::standard();
-    let kept = ["backlash", "hysteresis", "cyclic_error", "scale_error", "positioning_error", "straightness"];
     let names: Vec<String> = library.names().into_iter().map(String::from).collect();
     for name in names.iter().filter(|n| !kept.contains(&n.as_str())) {
         // Forms go with what they are forms of.
@@ -219,6 +215,16 @@ fn a_mill_is_diagnosed_and_corrected(samples: usize) {
             library = library.without(name).unwrap_or_else(|e| panic!("{e}"));
         }
     }
+    library
+}
+
+/// From a recording of so many samples.
+fn a_mill_is_diagnosed_and_corrected(samples: usize) {
+    let machine = common::machine("xyz_mill");
+    let truth = erroneous(&machine, Vec::new());
+    let recordings = [measured(&truth, &path(samples, LEARNT), 2e-7)];
+    let library =
+        only(&["backlash", "hysteresis", "cyclic_error", "scale_error", "positioning_error", "straightness"]);
     let request = DiagnoseOptions::default();
     let mut diagnosis =
         diagnose(&machine, &recordings, &library, &request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
@@ -255,4 +261,37 @@ fn a_mill_is_measured_diagnosed_and_its_program_corrected_to_95_percent() {
 #[ignore = "long: the diagnosis of 1500 samples"]
 fn so_it_is_from_a_longer_recording() {
     a_mill_is_diagnosed_and_corrected(1500);
+}
+
+#[test]
+fn what_has_no_name_is_modelled_and_corrected_all_the_same() {
+    let machine = common::machine("xyz_mill");
+    let play = vec![effect(&machine, "backlash", "x", &[30e-6], &[])];
+    let truth = CalibratedMachine::nominal(machine.clone())
+        .with_deviations(random_deviations(&machine, 0.3, 5))
+        .with_effects(play, vec![1e-9; 3])
+        .unwrap_or_else(|e| panic!("{e}"));
+    let recordings = [measured(&truth, &path(600, LEARNT), 2e-7)];
+    // Nobody has told the program of play, nor of anything that looks like it.
+    let library = only(&["scale_error", "straightness", "gravity_compliance"]);
+    let request = DiagnoseOptions::default();
+    let mut diagnosis =
+        diagnose(&machine, &recordings, &library, &request, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    assert!(diagnosis.findings.is_empty(), "{:?}", diagnosis.findings);
+    let unexplained = diagnosis.unexplained.as_ref().expect("play");
+    assert_eq!(unexplained.at, "x", "{unexplained:?}");
+    let part = &unexplained.parts[0];
+    assert_eq!((part.at.as_str(), part.modelled), ("x", true), "{part:?}");
+    assert!(part.depends_on.contains(&"direction of x".to_string()), "{part:?}");
+    // Half of the play to either side.
+    assert!(part.rms.m.is_some_and(|rms| (rms - 15e-6).abs() < 2e-6), "{part:?}");
+    let pair = part.held_out_rms.m.expect("lengths");
+    assert!(pair.after < 0.1 * pair.before, "{pair:?}");
+    let model =
+        diagnosis.model(&machine, &recordings, request.options, &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let again = CalibratedMachine::parse("model.ron", &model.to_ron()).unwrap_or_else(|e| panic!("{e}"));
+    let meant = path(600, [1.9, 2.6, 3.3]);
+    let (sent, _) = compensated(&again, &meant);
+    let (before, after) = (error(&truth, &meant, &meant), error(&truth, &sent, &meant));
+    assert!(after < 0.1 * before, "{before:e} {after:e}");
 }

@@ -289,7 +289,13 @@ fn bumps_are_unexplained_at_their_joint(seeds: &[u64]) {
         };
         let with = told(1.0, &mut random);
         assert_eq!(names(&with), [], "seed {seed}");
-        assert_eq!(with.unexplained.as_ref().map(|u| u.at.as_str()), Some("q3"), "seed {seed}");
+        let unexplained = with.unexplained.as_ref().unwrap_or_else(|| panic!("seed {seed}"));
+        assert_eq!(unexplained.at, "q3", "seed {seed}");
+        let part = unexplained.parts.first().unwrap_or_else(|| panic!("seed {seed}"));
+        assert!(
+            part.at == "q3" && part.depends_on == ["position of q3"] && part.modelled,
+            "seed {seed}: {part:?}"
+        );
         let without = told(0.0, &mut random);
         assert!(without.findings.is_empty() && without.unexplained.is_none(), "seed {seed}");
     }

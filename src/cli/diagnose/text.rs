@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::diagnose::{
     Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, SaidBy,
-    StandsStill, Unexplained, UnseenSideBranch, Where,
+    StandsStill, Unexplained, UnnamedPart, UnseenSideBranch, Where,
 };
 use crate::effects::in_words;
 use crate::feature::Dimension;
@@ -275,6 +275,7 @@ pub(crate) fn tests(finding: &Finding) -> Vec<(&str, Vec<String>)> {
 /// What there is to say of a structure without a name.
 pub(crate) fn about_unexplained(unexplained: &Unexplained) -> Vec<String> {
     let mut lines = Vec::new();
+    lines.extend(unexplained.parts.iter().map(part));
     if let Some(places) = places(&unexplained.r#where, usize::MAX) {
         lines.push(format!("it stands out in {places}"));
     }
@@ -287,6 +288,28 @@ pub(crate) fn about_unexplained(unexplained: &Unexplained) -> Vec<String> {
         lines.push("next test: the same path once more, and a stretch at rest".into());
     }
     lines
+}
+
+/// One part: its place, what it follows, how large it is, and whether the model has it.
+fn part(part: &UnnamedPart) -> String {
+    let sizes: Vec<String> =
+        both(part.rms.m, part.rms.rad).into_iter().map(|(rms, angle)| amount(rms, angle)).collect();
+    let held_out: Vec<String> = both(part.held_out_rms.m, part.held_out_rms.rad)
+        .into_iter()
+        .map(|(pair, angle)| format!("{} -> {}", amount(pair.before, angle), amount(pair.after, angle)))
+        .collect();
+    format!(
+        "something at {} that follows the {}: {} RMS; stretches left out of the fit {}; {}",
+        part.at,
+        part.depends_on.join(" and the "),
+        sizes.join(", "),
+        held_out.join(", "),
+        if part.modelled {
+            "the model has it"
+        } else {
+            "told only, since it is not foretold any better with it"
+        }
+    )
 }
 
 /// `rec_1.csv from 0 s to 61 s (80 %), rec_2.csv (20 %)`.
