@@ -127,15 +127,6 @@ impl Model {
         left.as_slice().to_vec()
     }
 
-    /// What effect `i` makes of the readings, m and rad.
-    pub fn made(&self, search: &Search, in_model: &[ModelTerm], i: usize) -> Option<Vec<f64>> {
-        let effect = &in_model[i];
-        let raw = search.rows.raw(&search.candidates[effect.candidate], &effect.score.parameters)?;
-        let count = effect.columns.ncols();
-        let made = raw.columns(0, count) * effect.score.room * self.solution.rows(self.offsets[i], count);
-        Some(made.as_slice().to_vec())
-    }
-
     /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together. `shape`: part of
     /// what shapes may depart from the families' by which they do.
     pub fn effect(&self, search: &Search, in_model: &[ModelTerm], i: usize, shape: f64) -> Solved {

@@ -13,7 +13,7 @@ use super::finding::HeldOutPair;
 use super::folds;
 use super::held_out::Model;
 use super::score::Rows;
-use super::search::{ENTER, ModelTerm, Search};
+use super::search::{ENTER, ModelTerm, Search, all_but};
 use super::shares::Shares;
 use crate::effects::{Candidate, Library, Place, RecordingFacts};
 use crate::feature::Dependence;
@@ -30,7 +30,7 @@ pub struct UnnamedPart {
     pub at: String,
     /// What it depends on: `position of c`, `direction of c`, `time`.
     pub depends_on: Vec<String>,
-    /// What it makes of the readings.
+    /// What it makes of the readings beyond what geometry and all else would take of it.
     #[serde(flatten, with = "rms")]
     pub rms: ByQuantity<Option<f64>>,
     /// RMS on stretches that were left out, the other parts taken in.
@@ -138,6 +138,7 @@ impl Unnamed {
         modelled: bool,
     ) -> Vec<(UnnamedPart, Named)> {
         let model = Model::new(search, all);
+        let left = model.residual(search, all);
         let one = |i: usize| {
             let (term, candidate) = (&all[i], &search.candidates[all[i].candidate]);
             let library = if term.candidate < self.first { library } else { &self.library };
@@ -145,12 +146,10 @@ impl Unnamed {
             let identified = solved.identified(candidate, library, term.score.parameters.clone());
             let sizes = identified.sizes(&search.rows.linear.samples);
             let named = Named { effect: identified.stored(machine, &sizes), scales: term.scales(search) };
-            let made = model.made(search, all, i).unwrap_or_default();
-            let of = |quantity: Quantity| {
-                Some(&made)
-                    .filter(|made| !made.is_empty())
-                    .and_then(|made| rms_of(search, made, quantity == Quantity::Angle))
-            };
+            let others = all_but(all, Some(i));
+            let without = Model::new(search, &others).residual(search, &others);
+            let made: Vec<f64> = without.iter().zip(&left).map(|(without, with)| without - with).collect();
+            let of = |quantity: Quantity| rms_of(search, &made, quantity == Quantity::Angle);
             let part = UnnamedPart {
                 at: candidate.place.name(machine),
                 depends_on: depends_on(term, candidate, machine),
