@@ -4,6 +4,11 @@ use std::process::Command;
 
 use super::*;
 
+mod any_program;
+mod by_hand;
+mod client;
+mod drawn;
+
 /// Moves in what LinuxCNC's interpreter says.
 fn canonical_moves(text: &str) -> (usize, usize) {
     static NUMBER: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);

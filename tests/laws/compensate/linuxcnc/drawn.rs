@@ -1,0 +1,697 @@
+//! Programs drawn at random in what both controls and compensation follow of RS-274, and what is known of each of their moves.
+
+use kincal::Machine;
+use kincal::machine::JointKind;
+
+use super::client::{LETTERS, MARK, OFFSETS, Tables};
+use crate::common::random::Random;
+
+/// A move of a program, in the order in which they run.
+#[derive(Clone, Debug)]
+pub struct Planned {
+    /// Line of the program, from 1.
+    pub line: usize,
+    pub sort: Sort,
+    /// Whether every axis stands at a place that the program has named.
+    pub known: bool,
+    /// Unit of lengths, mm.
+    pub unit: f64,
+    /// Whether the block has its time for a feed.
+    pub inverse_time: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sort {
+    Straight,
+    Arc,
+    Cycle,
+    /// G53, G28: places of the machine.
+    Machine,
+}
+
+/// A program with its control.
+pub struct Drawn {
+    pub text: String,
+    pub planned: Vec<Planned>,
+    pub tables: Tables,
+    /// By axis: the machine's own frame less the joint, mm and deg.
+    pub zero: Vec<f64>,
+    pub reference_length: f64,
+    /// The set-up that says the same.
+    pub setup: String,
+    /// By axis: where it stands before the first move, as a joint, mm and deg.
+    pub start: Vec<f64>,
+}
+
+/// What programs are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Kind {
+    /// Arcs among the moves.
+    pub arcs: bool,
+    /// Every way is known: no tool, no place of the machine.
+    pub known_ways: bool,
+    /// Moves between marks.
+    pub marked: bool,
+    pub moves: usize,
+}
+
+pub struct AxisOf {
+    pub letter: &'static str,
+    /// Among X Y Z A B C.
+    pub index: usize,
+    pub rotary: bool,
+    /// Of the joint, mm or deg.
+    range: (f64, f64),
+}
+
+/// The axes of a machine whose axes are X, Y, Z and two of A, B, C, by command.
+pub fn axes_of(machine: &Machine) -> Option<Vec<AxisOf>> {
+    let axes: Option<Vec<AxisOf>> = (0..machine.commands().len())
+        .map(|c| {
+            let joint = machine.command_joint(c);
+            let word = joint.nc_word();
+            let index = LETTERS.iter().position(|letter| *letter == word.address)?;
+            let rotary = joint.kind == JointKind::Revolute;
+            let (from, to) = machine.travel(c);
+            let unit = if rotary { 180.0 / std::f64::consts::PI } else { 1e3 };
+            let (middle, half) = (0.5 * (from + to) * unit, 0.5 * (to - from) * unit);
+            let half = (0.8 * half).min(if rotary { 170.0 } else { 180.0 });
+            let fits = word.sign == 1 && joint.follows.is_none() && rotary == (index > 2);
+            let range = (middle - half, middle + half);
+            fits.then_some(AxisOf { letter: LETTERS[index], index, rotary, range })
+        })
+        .collect();
+    axes.filter(|axes| axes.len() == 5 && (0..3).all(|i| axes.iter().any(|a| a.index == i)))
+}
+
+/// Where a program stands while it is drawn.
+struct Draw<'a> {
+    random: &'a mut Random,
+    axes: &'a [AxisOf],
+    kind: Kind,
+    tables: Tables,
+    zero: Vec<f64>,
+    /// Joints, mm and deg.
+    at: Vec<f64>,
+    lost: Vec<bool>,
+    preset: Vec<f64>,
+    local: bool,
+    offset: usize,
+    counted: f64,
+    inch: bool,
+    incremental: bool,
+    absolute_centre: bool,
+    inverse_time: bool,
+    feed: bool,
+    plane: usize,
+    motion: Option<u8>,
+    decimals: (usize, usize),
+    lower_case: bool,
+    blanks: bool,
+    numbered: bool,
+    block: usize,
+    subs: usize,
+    lines: Vec<String>,
+    sub_lines: Vec<String>,
+    inside: bool,
+    planned: Vec<(bool, Planned)>,
+}
+
+const INCH: f64 = 25.4;
+
+impl Draw<'_> {
+    fn chance(&mut self, share: f64) -> bool {
+        self.random.between(0.0, 1.0) < share
+    }
+
+    fn index(&mut self, count: usize) -> usize {
+        (self.random.between(0.0, count as f64) as usize).min(count - 1)
+    }
+
+    fn one_of<'t>(&mut self, texts: &[&'t str]) -> &'t str {
+        texts[self.index(texts.len())]
+    }
+
+    fn unit(&self) -> f64 {
+        if self.inch { INCH } else { 1.0 }
+    }
+
+    fn axis(&self, index: usize) -> usize {
+        self.axes.iter().position(|a| a.index == index).expect("X, Y and Z")
+    }
+
+    /// What is added to the program's coordinate for the joint.
+    fn shift(&self, c: usize) -> f64 {
+        let i = self.axes[c].index;
+        let counted = if i == 2 { self.counted } else { 0.0 };
+        self.tables.offsets[self.offset][i] + self.preset[c] + counted - self.zero[c]
+    }
+
+    /// A number near `value` (mm or deg) as it may be written, and what it means.
+    fn number(&mut self, value: f64, rotary: bool) -> (String, f64) {
+        let unit = if rotary { 1.0 } else { self.unit() };
+        let most = if rotary { self.decimals.1 } else { self.decimals.0 + usize::from(self.inch) };
+        let least = if rotary || self.kind.arcs { most } else { 0 };
+        let decimals = least + self.index(most - least + 1);
+        // Whole inches would lead out of reach.
+        let decimals = if self.inch && !rotary { decimals.max(2) } else { decimals };
+        let mut text = format!("{:.decimals$}", value / unit);
+        let written: f64 = text.parse().expect("a number");
+        if decimals > 0 && self.chance(0.4) {
+            text = text.trim_end_matches('0').to_string();
+            if self.chance(0.5) {
+                text = text.trim_end_matches('.').to_string();
+            }
+        } else if decimals == 0 && self.chance(0.5) {
+            text.push('.');
+        }
+        let (sign, digits) = match text.strip_prefix('-') {
+            Some(digits) => ("-", digits.to_string()),
+            None => (if self.chance(0.1) { "+" } else { "" }, text.clone()),
+        };
+        let digits = match digits.strip_prefix("0.") {
+            Some(behind) if !behind.is_empty() && self.chance(0.4) => format!(".{behind}"),
+            _ if self.chance(0.05) => format!("00{digits}"),
+            _ => digits,
+        };
+        (format!("{sign}{digits}"), written * unit)
+    }
+
+    fn word(&mut self, letter: &str, value: f64, rotary: bool) -> (String, f64) {
+        let (text, meant) = self.number(value, rotary);
+        let blank = if self.blanks && self.chance(0.2) { " " } else { "" };
+        (format!("{letter}{blank}{text}"), meant)
+    }
+
+    /// The word that brings a joint near `joint`; it stands there then.
+    fn axis_word(&mut self, c: usize, joint: f64) -> String {
+        let (letter, rotary) = (self.axes[c].letter, self.axes[c].rotary);
+        let from = if self.incremental { self.at[c] } else { self.shift(c) };
+        let (text, meant) = self.word(letter, joint - from, rotary);
+        self.at[c] = from + meant;
+        self.lost[c] = false;
+        text
+    }
+
+    /// A place within range near where a joint stands.
+    fn near(&mut self, c: usize, step: f64) -> f64 {
+        let (low, high) = self.axes[c].range;
+        let at = self.at[c].clamp(low, high);
+        self.random.between((at - step).max(low), (at + step).min(high))
+    }
+
+    fn g(&mut self, code: &str) -> String {
+        let (whole, rest) = code.split_once('.').unwrap_or((code, ""));
+        let whole =
+            if whole.len() == 1 && self.chance(0.3) { format!("0{whole}") } else { whole.to_string() };
+        if rest.is_empty() { format!("G{whole}") } else { format!("G{whole}.{rest}") }
+    }
+
+    /// Puts the words of a block into a line.
+    fn put(&mut self, mut words: Vec<String>) {
+        if self.chance(0.08) {
+            let at = self.index(words.len() + 1);
+            let note = self.one_of(&["(on)", "(X1 Y2)", "( a, b )"]);
+            words.insert(at, note.to_string());
+        }
+        let separator = if self.blanks || self.chance(0.8) { " " } else { "" };
+        let mut text = words.join(separator);
+        if self.numbered && self.chance(0.7) {
+            self.block += 10;
+            text = format!("N{} {text}", self.block);
+        }
+        if self.chance(0.05) {
+            text.push_str(self.one_of(&[" ; X5", ";", "  "]));
+        }
+        if self.lower_case {
+            text = text.to_lowercase();
+        }
+        self.line(text);
+    }
+
+    fn line(&mut self, text: String) {
+        if self.inside { self.sub_lines.push(text) } else { self.lines.push(text) }
+    }
+
+    fn plan(&mut self, sort: Sort) {
+        let line = if self.inside { self.sub_lines.len() } else { self.lines.len() };
+        let known = !self.lost.iter().any(|lost| *lost);
+        let (unit, inverse_time) = (self.unit(), self.inverse_time);
+        let moves = Planned { line, sort, known, unit, inverse_time: inverse_time && self.motion != Some(0) };
+        self.planned.push((self.inside, moves));
+        if self.kind.marked {
+            self.line(MARK.to_string());
+        }
+    }
+
+    /// Modal words that may stand before a move.
+    fn modal(&mut self, words: &mut Vec<String>) {
+        if self.chance(0.06) {
+            self.incremental = !self.incremental;
+            let code = if self.incremental { "91" } else { "90" };
+            words.push(self.g(code));
+        }
+        if self.chance(0.03) {
+            self.inch = !self.inch;
+            self.feed = false;
+            words.push(if self.inch { "G20" } else { "G21" }.to_string());
+        }
+        if self.chance(0.04) {
+            self.plane = self.index(3);
+            words.push(["G17", "G18", "G19"][self.plane].to_string());
+        }
+        if self.chance(0.05) {
+            self.inverse_time = !self.inverse_time;
+            self.feed = false;
+            words.push(if self.inverse_time { "G93" } else { "G94" }.to_string());
+        }
+    }
+
+    fn put_motion(&mut self, words: &mut Vec<String>, code: u8) {
+        if self.motion != Some(code) || self.chance(0.3) {
+            let text = code.to_string();
+            words.push(self.g(&text));
+        }
+        self.motion = Some(code);
+    }
+
+    fn put_feed(&mut self, words: &mut Vec<String>) {
+        if self.inverse_time {
+            words.push(format!("F{:.1}", self.random.between(2.0, 40.0)));
+        } else if !self.feed || self.chance(0.2) {
+            let feed = self.random.between(200.0, 3000.0);
+            let text = match self.index(3) {
+                0 => format!("{feed:.0}"),
+                1 => format!("{feed:.0}."),
+                _ => format!("{feed:.2}"),
+            };
+            words.push(format!("F{text}"));
+            self.feed = true;
+        }
+    }
+
+    fn straight(&mut self) {
+        let mut words = Vec::new();
+        self.modal(&mut words);
+        let any_lost = self.lost.iter().any(|lost| *lost);
+        let rapid = any_lost || self.chance(0.25);
+        if any_lost && self.incremental {
+            self.incremental = false;
+            words.push("G90".into());
+        }
+        self.put_motion(&mut words, if rapid { 0 } else { 1 });
+        let turns_alone = !any_lost && self.chance(0.2);
+        let mut named: Vec<usize> = Vec::new();
+        while named.is_empty() {
+            for c in 0..5 {
+                let share = if self.lost[c] { 0.97 } else { 0.45 };
+                if (!turns_alone || self.axes[c].rotary) && self.chance(share) {
+                    named.push(c);
+                }
+            }
+        }
+        let step = if self.chance(0.2) { 400.0 } else { 30.0 };
+        let mut axis_words = Vec::new();
+        for c in named {
+            let to = self.near(c, step);
+            axis_words.push(self.axis_word(c, to));
+        }
+        if turns_alone && self.chance(0.15) {
+            // A linear axis that is named and stays.
+            let c = self.axis(0);
+            let stays = if self.incremental { Some("X0".to_string()) } else { None };
+            axis_words.extend(stays.inspect(|_| self.lost[c] = false));
+        }
+        self.shuffle(&mut axis_words);
+        words.extend(axis_words);
+        if !rapid {
+            self.put_feed(&mut words);
+        }
+        if self.chance(0.1) {
+            self.shuffle(&mut words);
+        }
+        self.put(words);
+        self.plan(Sort::Straight);
+    }
+
+    /// Axes as people write them, or in any order.
+    fn shuffle(&mut self, words: &mut [String]) {
+        words.sort_by_key(|word| LETTERS.iter().position(|l| word.starts_with(l)).unwrap_or(0));
+        if self.chance(0.2) {
+            for k in (1..words.len()).rev() {
+                let with = self.index(k + 1);
+                words.swap(k, with);
+            }
+        }
+    }
+
+    fn arc(&mut self) {
+        use std::f64::consts::TAU;
+        let mut words = Vec::new();
+        self.modal(&mut words);
+        if self.chance(0.1) {
+            self.absolute_centre = !self.absolute_centre;
+            words.push(if self.absolute_centre { "G90.1" } else { "G91.1" }.into());
+        }
+        let plane = [[0, 1], [2, 0], [1, 2]][self.plane];
+        let [first, second] = plane.map(|i| self.axis(i));
+        let (r, from) = (self.random.between(4.0, 35.0), self.random.between(0.0, TAU));
+        let place = |angle: f64| (r * angle.cos(), r * angle.sin());
+        let by = place(from);
+        let centre = [self.at[first] - by.0, self.at[second] - by.1];
+        let fits = |c: usize, at: f64| at - r > self.axes[c].range.0 && at + r < self.axes[c].range.1;
+        if !fits(first, centre[0]) || !fits(second, centre[1]) {
+            if !words.is_empty() {
+                self.put(words);
+            }
+            return;
+        }
+        let clockwise = self.chance(0.5);
+        self.put_motion(&mut words, if clockwise { 2 } else { 3 });
+        let radius = self.chance(0.4);
+        let closed = !radius && self.chance(0.1);
+        let mut sweep = self.random.between(0.1, TAU - 0.1);
+        if radius && (sweep - 0.5 * TAU).abs() < 0.2 {
+            sweep = 0.3 * TAU;
+        }
+        let to = place(if clockwise { from - sweep } else { from + sweep });
+        let mut axis_words = Vec::new();
+        let start = [self.at[first], self.at[second]];
+        if !closed {
+            axis_words.push(self.axis_word(first, centre[0] + to.0));
+            axis_words.push(self.axis_word(second, centre[1] + to.1));
+        } else if !self.incremental && self.chance(0.5) {
+            axis_words.push(self.axis_word(first, start[0]));
+            if self.at[first] != start[0] {
+                self.at[first] = start[0];
+                axis_words.clear();
+            }
+        }
+        if self.chance(0.3) {
+            let other = self.axis(3 - plane[0] - plane[1]);
+            let to = self.near(other, 15.0);
+            axis_words.push(self.axis_word(other, to));
+        }
+        if self.chance(0.2) {
+            let c = (0..5).rfind(|c| self.axes[*c].rotary).expect("two are");
+            let to = self.near(c, 10.0);
+            axis_words.push(self.axis_word(c, to));
+        }
+        self.shuffle(&mut axis_words);
+        words.extend(axis_words);
+        if radius {
+            let r = if sweep > 0.5 * TAU { -r } else { r };
+            words.push(self.word("R", r, false).0);
+        } else {
+            let letters = plane.map(|i| ["I", "J", "K"][i]);
+            for (k, c) in [first, second].into_iter().enumerate() {
+                let base = if self.absolute_centre { self.shift(c) } else { start[k] };
+                let text = self.word(letters[k], centre[k] - base, false).0;
+                words.push(text);
+            }
+        }
+        if !radius && self.chance(0.15) {
+            words.push(format!("P{}", 1 + self.index(3)));
+        }
+        self.put_feed(&mut words);
+        self.put(words);
+        self.plan(Sort::Arc);
+    }
+
+    fn drill(&mut self) {
+        if self.inverse_time || self.incremental || self.plane != 0 {
+            self.put(vec!["G17 G90 G94".into()]);
+            (self.inverse_time, self.incremental, self.plane, self.feed) = (false, false, 0, false);
+        }
+        let code = self.one_of(&["G81", "G82", "G83", "G73", "G85", "G89"]);
+        let (x, y, z) = (self.axis(0), self.axis(1), self.axis(2));
+        let top = self.at[z].min(self.axes[z].range.1) - self.shift(z);
+        let (retract, depth) = (top - self.random.between(2.0, 9.0), top - self.random.between(12.0, 25.0));
+        let side = self.one_of(&["G98 ", "G99 ", ""]);
+        for k in 0..1 + self.index(3) {
+            let (px, py) = (self.near(x, 30.0), self.near(y, 30.0));
+            let mut words = vec![self.axis_word(x, px), self.axis_word(y, py)];
+            if k == 0 {
+                words.insert(0, format!("{side}{code}"));
+                words.push(self.word("Z", depth, false).0);
+                words.push(self.word("R", retract, false).0);
+                match code {
+                    "G82" | "G89" => words.push("P0.2".into()),
+                    "G83" | "G73" => words.push(format!("Q{:.3}", 4.0 / self.unit())),
+                    _ => {}
+                }
+                words.push(format!("F{:.0}", self.random.between(50.0, 300.0)));
+                self.feed = true;
+            }
+            self.put(words);
+            self.motion = None;
+            self.lost[z] = true;
+            self.plan(Sort::Cycle);
+        }
+        self.put(vec!["G80".into()]);
+    }
+
+    /// What is no move.
+    fn other(&mut self) {
+        let quiet = self.kind.known_ways || self.inside;
+        match self.index(if quiet { 9 } else { 16 }) {
+            0 => {
+                let text =
+                    self.one_of(&["M8", "M9", "S1200 M3", "G4 P.5", "M5", "G64 P.01", "G61", "G40", "/M8"]);
+                self.put(vec![text.to_string()]);
+            }
+            1 => self.put(vec!["(tool path 3: G1 X5)".into()]),
+            2 => self.line(String::new()),
+            3 => {
+                let mut words = Vec::new();
+                self.modal(&mut words);
+                if !words.is_empty() {
+                    self.put(words);
+                }
+            }
+            4 if self.feed && !self.inverse_time => self.put(vec!["F750".into()]),
+            5 => {
+                self.put(vec!["G80".into()]);
+                self.motion = None;
+            }
+            6 | 7 if !self.inside => {
+                self.offset = self.index(OFFSETS.len());
+                self.put(vec![OFFSETS[self.offset].into()]);
+            }
+            8 | 9 if !self.inside && !self.local => self.preset(),
+            10 if !self.inside => {
+                let code = self.one_of(&["G92.1", "G92.2"]);
+                self.put(vec![code.into()]);
+                self.preset.fill(0.0);
+                self.local = false;
+            }
+            11 | 12 => self.change_tool(),
+            13 => {
+                self.counted = 0.0;
+                self.put(vec!["G49".into()]);
+                let z = self.axis(2);
+                self.lost[z] = true;
+            }
+            14 => self.machine_place(),
+            15 => self.home(),
+            _ => {}
+        }
+    }
+
+    fn preset(&mut self) {
+        let mut words = vec![self.g("92")];
+        for c in 0..5 {
+            if !self.lost[c] && self.chance(0.4) {
+                let value = self.random.between(-40.0, 40.0);
+                let (text, meant) = self.word(self.axes[c].letter, value, self.axes[c].rotary);
+                words.push(text);
+                self.preset[c] += self.at[c] - self.shift(c) - meant;
+            }
+        }
+        if words.len() > 1 {
+            self.put(words);
+        }
+    }
+
+    fn change_tool(&mut self) {
+        let tool = self.index(self.tables.tools.len());
+        if self.chance(0.5) {
+            self.put(vec![format!("T{} M6", tool + 1)]);
+        } else {
+            self.put(vec![format!("T{}", tool + 1)]);
+            self.put(vec!["M6".into()]);
+        }
+        let by = if self.chance(0.15) { self.index(self.tables.tools.len()) } else { tool };
+        let h = if by != tool || self.chance(0.7) { format!("G43 H{}", by + 1) } else { "G43".into() };
+        self.put(vec![h]);
+        self.counted = self.tables.tools[by];
+        (0..5).filter(|c| !self.axes[*c].rotary).for_each(|c| self.lost[c] = true);
+    }
+
+    fn machine_place(&mut self) {
+        let mut words = vec!["G90 G53 G0".to_string()];
+        (self.incremental, self.motion) = (false, Some(0));
+        let c = self.index(5);
+        let joint = self.near(c, 60.0);
+        let (text, meant) = self.word(self.axes[c].letter, joint + self.zero[c], self.axes[c].rotary);
+        self.at[c] = meant - self.zero[c];
+        self.lost[c] = true;
+        words.push(text);
+        self.put(words);
+        self.plan(Sort::Machine);
+    }
+
+    fn home(&mut self) {
+        let z = self.axis(2);
+        let back = if self.incremental { "" } else { " G90" };
+        self.put(vec!["G91 G28 Z0".into()]);
+        self.at[z] = self.tables.reference[2] - self.zero[z];
+        self.lost[z] = true;
+        self.plan(Sort::Machine);
+        if !back.is_empty() {
+            self.put(vec!["G90".into()]);
+        }
+    }
+
+    /// Every axis by name.
+    fn begin(&mut self) {
+        (self.inch, self.incremental, self.inverse_time, self.feed) = (false, false, false, false);
+        (self.plane, self.motion, self.absolute_centre) = (0, Some(0), false);
+        let mut words = vec!["G21 G90 G94 G17 G91.1 G0".to_string()];
+        for c in 0..5 {
+            let (low, high) = self.axes[c].range;
+            let to = self.random.between(low, high);
+            words.push(self.axis_word(c, to));
+        }
+        self.put(words);
+        self.plan(Sort::Straight);
+    }
+
+    fn body(&mut self, moves: usize) {
+        let before = self.planned.len();
+        while self.planned.len() < before + moves {
+            let any_lost = self.lost.iter().any(|lost| *lost);
+            match self.index(100) {
+                _ if any_lost => self.straight(),
+                0..25 if self.kind.arcs => self.arc(),
+                25..28 if self.kind.marked && !self.kind.known_ways && !self.inside => self.drill(),
+                28..30 if !self.inside => self.sub_program(),
+                30..48 => self.other(),
+                _ => self.straight(),
+            }
+        }
+    }
+
+    fn sub_program(&mut self) {
+        self.subs += 1;
+        let name =
+            if self.chance(0.5) { format!("o{}", 100 + self.subs) } else { format!("o<s{}>", self.subs) };
+        let first = self.planned.len();
+        self.sub_lines.push(format!("{name} sub"));
+        self.inside = true;
+        self.begin();
+        let moves = 1 + self.index(5);
+        self.body(moves);
+        self.inside = false;
+        self.sub_lines.push(format!("{name} endsub"));
+        let moves = self.planned[first..].to_vec();
+        self.lines.push(format!("{name} call"));
+        if self.chance(0.3) {
+            self.lines.push(format!("{name} call"));
+            self.planned.extend(moves);
+        }
+    }
+}
+
+/// A program for a machine with these axes.
+pub fn drawn(random: &mut Random, axes: &[AxisOf], kind: Kind) -> Drawn {
+    let mut tables = Tables::default();
+    let fits = |i: usize| axes.iter().any(|axis| axis.index == i);
+    let round = |value: f64| (value * 1e3).round() / 1e3;
+    for offset in &mut tables.offsets {
+        for (i, value) in offset.iter_mut().enumerate().filter(|(i, _)| fits(*i)) {
+            *value = round(random.between(-60.0, 60.0)) * if i > 2 { 0.5 } else { 1.0 };
+        }
+    }
+    tables.tools = (0..4).map(|_| round(random.between(20.0, 160.0))).collect();
+    let zero: Vec<f64> =
+        axes.iter().map(|axis| if axis.rotary { 0.0 } else { round(random.between(-80.0, 80.0)) }).collect();
+    let z = axes.iter().position(|axis| axis.index == 2).expect("Z");
+    tables.reference[2] = round(axes[z].range.1 - random.between(1.0, 30.0) + zero[z]);
+    let start: Vec<f64> = axes.iter().map(|axis| round(random.between(axis.range.0, axis.range.1))).collect();
+    let reference_length = round(random.between(0.0, 120.0));
+    let named = random.between(0.0, 1.0) < 0.5;
+    let mut draw = Draw {
+        axes,
+        kind,
+        zero: zero.clone(),
+        at: start.clone(),
+        lost: vec![false; 5],
+        preset: vec![0.0; 5],
+        local: false,
+        offset: 0,
+        counted: 0.0,
+        inch: false,
+        incremental: false,
+        absolute_centre: false,
+        inverse_time: false,
+        feed: false,
+        plane: 0,
+        motion: None,
+        decimals: (3 + random.between(0.0, 2.0) as usize, 3 + random.between(0.0, 3.0) as usize),
+        lower_case: random.between(0.0, 1.0) < 0.15,
+        blanks: random.between(0.0, 1.0) < 0.3,
+        numbered: random.between(0.0, 1.0) < 0.4,
+        block: 0,
+        subs: 0,
+        lines: Vec::new(),
+        sub_lines: Vec::new(),
+        inside: false,
+        planned: Vec::new(),
+        tables,
+        random,
+    };
+    if !named {
+        draw.put(vec!["G54".into()]);
+    }
+    draw.begin();
+    draw.body(kind.moves);
+    draw.put(vec!["M2".into()]);
+    let before = draw.sub_lines.len();
+    let place = |(inside, planned): (bool, Planned)| {
+        let line = if inside { planned.line } else { planned.line + before };
+        Planned { line, ..planned }
+    };
+    let planned: Vec<Planned> = std::mem::take(&mut draw.planned).into_iter().map(place).collect();
+    let lines: Vec<String> = draw.sub_lines.iter().chain(&draw.lines).cloned().collect();
+    let text = lines.join("\n") + "\n";
+    let tables = draw.tables;
+    let map = |values: &dyn Fn(&AxisOf, usize) -> f64| {
+        let words: Vec<String> = axes
+            .iter()
+            .enumerate()
+            .map(|(c, axis)| format!("\"{}\": {:.4}", axis.letter, values(axis, c)))
+            .collect();
+        format!("{{{}}}", words.join(", "))
+    };
+    let offsets: Vec<String> = OFFSETS
+        .iter()
+        .zip(&tables.offsets)
+        .map(|(name, offset)| format!("\"{name}\": {}", map(&|axis, _| offset[axis.index])))
+        .collect();
+    let tools: Vec<String> =
+        tables.tools.iter().enumerate().map(|(k, length)| format!("\"{}\": {length:.4}", k + 1)).collect();
+    let at_start = if named { "offset_at_start: \"G54\", " } else { "" };
+    let start_of = |axis: &AxisOf, c: usize| {
+        start[c] + zero[c] - if named { tables.offsets[0][axis.index] } else { 0.0 }
+    };
+    let setup = format!(
+        "Setup(units: (length: mm, angle: deg), zero: {}, work_offsets: {{{}}}, {at_start}tools: {{{}}}, reference_length: {reference_length}, start: {}, reference: {{\"Z\": {:.4}}})",
+        map(&|_, c| zero[c]),
+        offsets.join(", "),
+        tools.join(", "),
+        map(&start_of),
+        tables.reference[2],
+    );
+    Drawn { text, planned, tables, zero, reference_length, setup, start }
+}
