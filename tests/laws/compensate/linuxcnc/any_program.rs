@@ -26,6 +26,7 @@ struct Seen {
     lines: usize,
     cycles: usize,
     timed: usize,
+    least: usize,
     tip: f64,
     axis: f64,
     arc: f64,
@@ -176,9 +177,11 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             return Err(told(format!("line {}: {} and {} moves", planned.line, meant.len(), sent.len())));
         };
         if let Some((c, _)) = case.play {
-            let now = end.at(1.0)[case.axes[c].index] - drawn.zero[c];
-            let by = now - stood.unwrap_or(now);
-            if by.abs() > 1e-6 {
+            let place = |s: f64| end.at(s)[case.axes[c].index] - drawn.zero[c];
+            let now = place(1.0);
+            // An arc may turn an axis round on its way.
+            let by = if end.round.is_some() { now - place(1.0 - 1e-3) } else { now - stood.unwrap_or(now) };
+            if by.abs() > 1e-4 || end.round.is_some() && by.abs() > 1e-5 {
                 direction = by.signum() as i8;
             }
             stood = Some(now);
@@ -189,7 +192,7 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             let named = case
                 .axes
                 .iter()
-                .filter(|axis| line_of(&drawn.text, planned.line).to_uppercase().contains(axis.letter));
+                .filter(|axis| line_of(&drawn.text, planned.line).split(['(', ';']).next().unwrap_or_default().to_uppercase().contains(axis.letter));
             for axis in named {
                 if (a[axis.index] - b[axis.index]).abs() > 1.5e-4 {
                     return fault(format!(
@@ -263,10 +266,14 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
         let sum =
             |moves: &[Sent]| moves.iter().map(Sent::time).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         let (ways, feeds) = (end.ways(), end.sort == client::Sort::Feed);
-        let turns_alone = ways.0 < 1e-5 && ways.1 > 1e-5;
-        if feeds && meant.len() == 1 && (turns_alone || planned.inverse_time || ways.0 > 5.0) {
+        let turns_alone = ways.0 < 5e-5 && ways.1 > 1e-3;
+        if feeds && !singular && meant.len() == 1 && (turns_alone || planned.inverse_time || ways.0 > 5.0) {
             let ((a, open_a), (b, open_b)) = (sum(meant), sum(sent));
             seen.timed += 1;
+            if sent.iter().chain(meant).any(Sent::is_least) {
+                seen.least += 1;
+                continue;
+            }
             // A long way is longer by the correction.
             let longer = if turns_alone || planned.inverse_time { 0.0 } else { 1.0 / ways.0 };
             if (b - a).abs() > (0.01 + longer) * a + open_a + open_b {

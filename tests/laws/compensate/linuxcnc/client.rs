@@ -101,10 +101,16 @@ impl Sent {
         }
     }
 
+    /// Whether the interpreter has raised the feed of a block under G93 to the least that it knows, a tenth of a unit a minute.
+    pub fn is_least(&self) -> bool {
+        self.rate == 0.1
+    }
+
     /// Minutes that it takes and what half a digit of the feed leaves of that open: a control counts the linear way where there is one.
     pub fn time(&self) -> (f64, f64) {
         let (linear, turned) = self.ways();
-        let way = if linear > 1e-5 { linear / self.unit } else { turned };
+        // Rounding in inch is no way.
+        let way = if linear > 5e-5 { linear / self.unit } else { turned };
         let time = if way > 0.0 { way / self.rate } else { 0.0 };
         (time, time * 5.1e-5 / self.rate)
     }
@@ -142,7 +148,7 @@ fn reporting(text: &str) -> String {
 pub fn interpret(text: &str, tables: &Tables) -> Result<String, String> {
     static NUMBER: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
     let number = NUMBER.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-    let folder = std::env::temp_dir().join(format!("kincal_rs274_{}_{number}", std::process::id()));
+    let folder = std::env::temp_dir().join(format!("kincal_client_{}_{number}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for a moment");
     let write = |name: &str, text: &str| -> PathBuf {
         let path = folder.join(name);
@@ -158,6 +164,8 @@ pub fn interpret(text: &str, tables: &Tables) -> Result<String, String> {
         .arg(&tools)
         .arg(&program)
         .current_dir(&folder)
+        // Where it shares its tools with other processes.
+        .env("HOME", &folder)
         .output();
     let _ = std::fs::remove_dir_all(&folder);
     let out = out.unwrap_or_else(|e| panic!("rs274, the interpreter of LinuxCNC, does not start: {e}"));
@@ -165,7 +173,7 @@ pub fn interpret(text: &str, tables: &Tables) -> Result<String, String> {
     if out.status.success() && text.contains("PROGRAM_END") {
         return Ok(text);
     }
-    let said = text.lines().filter(|l| !l.contains("N.....") && !l.starts_with("executing"));
+    let said = text.lines().filter(|l| call_of(l).is_none() && !l.starts_with("executing"));
     Err(said.take(2).collect::<Vec<_>>().join(": "))
 }
 
@@ -204,12 +212,20 @@ struct Follower<'a> {
     offset: Axes,
     preset: Axes,
     counted: f64,
+    chosen: Option<f64>,
     tool: Option<f64>,
     rate: f64,
     plane: [usize; 2],
     marked: Vec<Vec<Sent>>,
     /// Whether the last move has only the digits of its canonical call.
     coarse: bool,
+}
+
+/// The canonical call in a line such as `   12 N.....  STRAIGHT_FEED(...)`; in the place of the points the number of the block.
+fn call_of(line: &str) -> Option<&str> {
+    let (number, rest) = line.trim_start().split_once(' ')?;
+    let (block, call) = rest.trim_start().split_once(' ')?;
+    (number.parse::<u64>().is_ok() && block.starts_with('N')).then_some(call.trim_start())
 }
 
 fn numbers(text: &str) -> Vec<f64> {
@@ -225,6 +241,7 @@ impl<'a> Follower<'a> {
             offset: [0.0; 6],
             preset: [0.0; 6],
             counted: 0.0,
+            chosen: None,
             tool: None,
             rate: 0.0,
             plane: [0, 1],
@@ -243,7 +260,7 @@ impl<'a> Follower<'a> {
     }
 
     fn line(&mut self, line: &str) -> Result<(), String> {
-        let Some((_, call)) = line.split_once("N..... ") else { return Ok(()) };
+        let Some(call) = call_of(line) else { return Ok(()) };
         let (name, arguments) = call.split_once('(').unwrap_or((call, ""));
         let n = numbers(arguments);
         match name {
@@ -269,7 +286,8 @@ impl<'a> Follower<'a> {
                 let near = |length: &&f64| (n[2] * self.unit - **length).abs() < 2e-3;
                 self.counted = *lengths.into_iter().find(near).ok_or(format!("no such length: {line}"))?;
             }
-            "CHANGE_TOOL" => self.tool = Some(self.tables.tools[n[0] as usize - 1]),
+            "SELECT_TOOL" => self.chosen = self.tables.tools.get(n[0] as usize - 1).copied(),
+            "CHANGE_TOOL" => self.tool = self.chosen,
             "SELECT_PLANE" => {
                 self.plane = match arguments {
                     a if a.contains("XY") => [0, 1],

@@ -216,7 +216,7 @@ impl Draw<'_> {
         }
         let separator = if self.blanks || self.chance(0.8) { " " } else { "" };
         let mut text = words.join(separator);
-        if self.numbered && self.chance(0.7) {
+        if self.numbered && self.chance(0.7) && !text.starts_with('/') {
             self.block += 10;
             text = format!("N{} {text}", self.block);
         }
@@ -246,7 +246,8 @@ impl Draw<'_> {
 
     /// Modal words that may stand before a move.
     fn modal(&mut self, words: &mut Vec<String>) {
-        if self.chance(0.06) {
+        let any_lost = self.lost.iter().any(|lost| *lost);
+        if any_lost && self.incremental || !any_lost && self.chance(0.06) {
             self.incremental = !self.incremental;
             let code = if self.incremental { "91" } else { "90" };
             words.push(self.g(code));
@@ -295,10 +296,6 @@ impl Draw<'_> {
         self.modal(&mut words);
         let any_lost = self.lost.iter().any(|lost| *lost);
         let rapid = any_lost || self.chance(0.25);
-        if any_lost && self.incremental {
-            self.incremental = false;
-            words.push("G90".into());
-        }
         self.put_motion(&mut words, if rapid { 0 } else { 1 });
         let turns_alone = !any_lost && self.chance(0.2);
         let mut named: Vec<usize> = Vec::new();
@@ -493,7 +490,7 @@ impl Draw<'_> {
                 self.lost[z] = true;
             }
             14 => self.machine_place(),
-            15 => self.home(),
+            15 if self.kind.marked => self.home(),
             _ => {}
         }
     }
