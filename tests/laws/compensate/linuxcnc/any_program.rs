@@ -26,7 +26,6 @@ struct Seen {
     lines: usize,
     cycles: usize,
     timed: usize,
-    least: usize,
     tip: f64,
     axis: f64,
     arc: f64,
@@ -170,29 +169,44 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
     };
     let listed = |count: u64, lines: Vec<usize>, line: usize| count > 50 || lines.contains(&line);
     let mut direction = 0i8;
-    let mut stood: Option<f64> = case.play.map(|(c, _)| drawn.start[c]);
+    // A move that starts where the axis is not right is another one.
+    let mut from_singular = false;
+    let mut stood = case.play.map_or(0.0, |(c, _)| drawn.start[c] + drawn.zero[c]);
+    // Whether that axis has just turned round where it is too near to say.
+    let mut turns = false;
     for ((planned, meant), sent) in drawn.planned.iter().zip(&before).zip(&after) {
         seen.moves += 1;
         let (Some(end), Some(last)) = (meant.last(), sent.last()) else {
             return Err(told(format!("line {}: {} and {} moves", planned.line, meant.len(), sent.len())));
         };
         if let Some((c, _)) = case.play {
-            let place = |s: f64| end.at(s)[case.axes[c].index] - drawn.zero[c];
-            let now = place(1.0);
-            // An arc may turn an axis round on its way.
-            let by = if end.round.is_some() { now - place(1.0 - 1e-3) } else { now - stood.unwrap_or(now) };
-            if by.abs() > 1e-4 || end.round.is_some() && by.abs() > 1e-5 {
+            let index = case.axes[c].index;
+            let now = end.at(1.0)[index];
+            // Along lines in the place of an arc the axis goes as the last of them does.
+            let round = end.round.is_some_and(|round| round.plane.contains(&index));
+            let by = if round { last.to[index] - last.from[index] } else { now - stood };
+            if by.abs() > if round { 3e-3 } else { 1e-4 } {
                 direction = by.signum() as i8;
+                turns = false;
+            } else if round {
+                turns = true;
             }
-            stood = Some(now);
+            stood = now;
         }
-        let fault = |what: String| Err(told(format!("line {}: {what}", planned.line)));
+        let play = case.play.map_or(String::new(), |(c, half)| {
+            format!(" (play of {} by {:.2} um or urad, going {direction})", case.axes[c].letter, half * 1e6)
+        });
+        let fault = |what: String| Err(told(format!("line {}: {what}{play}", planned.line)));
         if planned.sort == Sort::Machine {
             let (a, b) = (end.at(1.0), last.at(1.0));
-            let named = case
-                .axes
-                .iter()
-                .filter(|axis| line_of(&drawn.text, planned.line).split(['(', ';']).next().unwrap_or_default().to_uppercase().contains(axis.letter));
+            let named = case.axes.iter().filter(|axis| {
+                line_of(&drawn.text, planned.line)
+                    .split(['(', ';'])
+                    .next()
+                    .unwrap_or_default()
+                    .to_uppercase()
+                    .contains(axis.letter)
+            });
             for axis in named {
                 if (a[axis.index] - b[axis.index]).abs() > 1.5e-4 {
                     return fault(format!(
@@ -208,7 +222,7 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             report.unknown_places.first.iter().map(|u| u.line).collect(),
             planned.line,
         );
-        if !(planned.known || planned.sort == Sort::Cycle) || unknown {
+        if !(planned.known || planned.sort == Sort::Cycle) || unknown || turns {
             continue;
         }
         let unreached = listed(
@@ -221,6 +235,7 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             report.singular.first.iter().map(|u| u.line).collect(),
             planned.line,
         );
+        let starts_singular = std::mem::replace(&mut from_singular, singular);
         let (digit, digit_deg) = half(planned);
         let rounding = 3f64.sqrt() * digit + 0.05e-6;
         if planned.sort == Sort::Cycle {
@@ -267,13 +282,15 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             |moves: &[Sent]| moves.iter().map(Sent::time).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         let (ways, feeds) = (end.ways(), end.sort == client::Sort::Feed);
         let turns_alone = ways.0 < 5e-5 && ways.1 > 1e-3;
-        if feeds && !singular && meant.len() == 1 && (turns_alone || planned.inverse_time || ways.0 > 5.0) {
+        if feeds
+            && !end.is_least()
+            && !singular
+            && !starts_singular
+            && meant.len() == 1
+            && (turns_alone || planned.inverse_time || ways.0 > 5.0)
+        {
             let ((a, open_a), (b, open_b)) = (sum(meant), sum(sent));
             seen.timed += 1;
-            if sent.iter().chain(meant).any(Sent::is_least) {
-                seen.least += 1;
-                continue;
-            }
             // A long way is longer by the correction.
             let longer = if turns_alone || planned.inverse_time { 0.0 } else { 1.0 / ways.0 };
             if (b - a).abs() > (0.01 + longer) * a + open_a + open_b {

@@ -307,6 +307,10 @@ impl Draw<'_> {
                 }
             }
         }
+        // A rotary axis alone may take several lines, and only marks tell whose they are.
+        if !self.kind.marked && !rapid && named.iter().all(|c| self.axes[*c].rotary) {
+            named.push(self.axis(0));
+        }
         let step = if self.chance(0.2) { 400.0 } else { 30.0 };
         let mut axis_words = Vec::new();
         for c in named {
@@ -477,10 +481,18 @@ impl Draw<'_> {
             }
             8 | 9 if !self.inside && !self.local => self.preset(),
             10 if !self.inside => {
-                let code = self.one_of(&["G92.1", "G92.2"]);
-                self.put(vec![code.into()]);
+                if self.local {
+                    let words = self.axes.iter().map(|axis| format!("{}0", axis.letter)).collect::<Vec<_>>();
+                    self.put(vec![format!("G52 {}", words.join(" "))]);
+                } else {
+                    let code = self.one_of(&["G92.1", "G92.2"]);
+                    self.put(vec![code.into()]);
+                }
                 self.preset.fill(0.0);
                 self.local = false;
+            }
+            11 if !self.local && self.preset.iter().all(|by| *by == 0.0) && !self.inside => {
+                self.local_shift()
             }
             11 | 12 => self.change_tool(),
             13 => {
@@ -507,6 +519,22 @@ impl Draw<'_> {
         }
         if words.len() > 1 {
             self.put(words);
+        }
+    }
+
+    fn local_shift(&mut self) {
+        let mut words = vec!["G52".to_string()];
+        for c in 0..5 {
+            if self.chance(0.4) {
+                let value = self.random.between(-30.0, 30.0);
+                let (text, meant) = self.word(self.axes[c].letter, value, self.axes[c].rotary);
+                words.push(text);
+                self.preset[c] = meant;
+            }
+        }
+        if words.len() > 1 {
+            self.put(words);
+            self.local = true;
         }
     }
 
