@@ -291,11 +291,11 @@ impl Draw<'_> {
         }
     }
 
-    fn straight(&mut self) {
+    fn straight(&mut self, rapid: bool) {
         let mut words = Vec::new();
         self.modal(&mut words);
         let any_lost = self.lost.iter().any(|lost| *lost);
-        let rapid = any_lost || self.chance(0.25);
+        let rapid = rapid || any_lost || self.chance(0.25);
         self.put_motion(&mut words, if rapid { 0 } else { 1 });
         let turns_alone = !any_lost && self.chance(0.2);
         let mut named: Vec<usize> = Vec::new();
@@ -317,7 +317,7 @@ impl Draw<'_> {
             let to = self.near(c, step);
             axis_words.push(self.axis_word(c, to));
         }
-        if turns_alone && self.chance(0.15) {
+        if turns_alone && self.kind.marked && self.chance(0.15) {
             // A linear axis that is named and stays.
             let c = self.axis(0);
             let stays = if self.incremental { Some("X0".to_string()) } else { None };
@@ -535,6 +535,8 @@ impl Draw<'_> {
         if words.len() > 1 {
             self.put(words);
             self.local = true;
+            // At the first feed behind it the interpreter itself is wrong under inverse time.
+            self.straight(true);
         }
     }
 
@@ -597,12 +599,12 @@ impl Draw<'_> {
         while self.planned.len() < before + moves {
             let any_lost = self.lost.iter().any(|lost| *lost);
             match self.index(100) {
-                _ if any_lost => self.straight(),
+                _ if any_lost => self.straight(true),
                 0..25 if self.kind.arcs => self.arc(),
                 25..28 if self.kind.marked && !self.kind.known_ways && !self.inside => self.drill(),
                 28..30 if !self.inside => self.sub_program(),
                 30..48 => self.other(),
-                _ => self.straight(),
+                _ => self.straight(false),
             }
         }
     }
