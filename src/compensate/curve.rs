@@ -14,6 +14,8 @@ use super::tip_error::TipError;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Motion};
 
+/// Without getting better, lines are not made shorter than by this factor.
+const MOST_FINER: usize = 16;
 /// Most lines that take the place of one arc.
 const MOST_LINES: usize = 100_000;
 
@@ -55,15 +57,14 @@ pub(super) fn write(
         return refuse(block, motion_byte(block), CompensateFault::Arc);
     };
     let mut count = chords(pass, block, &arc, tolerance)?;
-    // Where the correction itself bends, as near a singular pose, chords of the arc are too long. A step of it, as of play, stays what
-    // it is: that is told.
-    let mut bend = bends(pass, block, &arc, count)?;
-    while bend > tolerance && 2 * count <= MOST_LINES {
-        let finer = bends(pass, block, &arc, 2 * count)?;
-        if finer > 0.6 * bend {
-            break;
+    // Where the correction itself bends, as near a singular pose, chords of the arc are too long. What no more lines mend is told.
+    let (mut bend, mut finer) = (bends(pass, block, &arc, count)?, count);
+    while bend > tolerance && 2 * finer <= MOST_LINES.min(MOST_FINER * count) {
+        finer *= 2;
+        let left = bends(pass, block, &arc, finer)?;
+        if left < bend {
+            (bend, count) = (left, finer);
         }
-        (bend, count) = (finer, 2 * count);
     }
     pass.report().split_arcs += 1;
     pass.report().arc_lines += count as u64;
@@ -96,6 +97,7 @@ fn bends(pass: &Pass, block: &Block, arc: &Arc, count: usize) -> Result<f64> {
     let (free, ways) = (program.free(), program.open_ways());
     let mut model = pass.corrector().model().ahead();
     let (mut from, mut worst) = (program.written().clone(), 0.0f64);
+    let mut piece = model.piece();
     for k in 1..=count {
         let at = |s: f64| -> Result<(Vec<f64>, Vec<f64>)> {
             let coordinates = arc.at(s / count as f64);
@@ -105,7 +107,9 @@ fn bends(pass: &Pass, block: &Block, arc: &Arc, count: usize) -> Result<f64> {
         model.advance(&q, &ways);
         let sent = pass.corrector().solve_with(&model.chain_at(&q), program, &q, &free).commands;
         let to = Position::new(sent.clone(), control.program(&sent, &coordinates));
-        if let Some(sent) = control.between(&from, &to, 0.5) {
+        // Across a reversal the correction steps, and no line is short enough.
+        let steps = std::mem::replace(&mut piece, model.piece()) != model.piece();
+        if let Some(sent) = control.between(&from, &to, 0.5).filter(|_| !steps) {
             let goal = control.goal(&at(k as f64 - 0.5)?.0);
             let there = model.chain_at(&q).w_from_t(&sent) * goal.t_from_tip;
             worst = worst.max(TipError::between(there, goal.w_from_tip).m());

@@ -184,8 +184,9 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             let now = end.at(1.0)[index];
             // Along lines in the place of an arc the axis goes as the last of them does.
             let round = end.round.is_some_and(|round| round.plane.contains(&index));
-            let by = if round { last.to[index] - last.from[index] } else { now - stood };
-            if by.abs() > if round { 3e-3 } else { 1e-4 } {
+            let before = end.at(1.0 - 1.0 / sent.len() as f64)[index];
+            let by = if round { now - before } else { now - stood };
+            if by.abs() > if round { 3e-4 } else { 1e-4 } {
                 direction = by.signum() as i8;
                 turns = false;
             } else if round {
@@ -222,7 +223,8 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             report.unknown_places.first.iter().map(|u| u.line).collect(),
             planned.line,
         );
-        if !(planned.known || planned.sort == Sort::Cycle) || unknown || turns {
+        let vague = meant.iter().chain(sent).any(|sent| sent.vague);
+        if !(planned.known || planned.sort == Sort::Cycle) || unknown || turns || vague {
             continue;
         }
         let unreached = listed(
@@ -291,9 +293,16 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
         {
             let ((a, open_a), (b, open_b)) = (sum(meant), sum(sent));
             seen.timed += 1;
-            // A long way is longer by the correction.
-            let longer = if turns_alone || planned.inverse_time { 0.0 } else { 1.0 / ways.0 };
-            if (b - a).abs() > (0.01 + longer) * a + open_a + open_b {
+            // Where the tip has a feed, the way is as much longer as the correction makes it.
+            let own_time = turns_alone || planned.inverse_time;
+            let way: f64 = sent.iter().map(|sent| sent.ways().0).sum();
+            let wanted = if own_time { a } else { a * way / ways.0 };
+            // A turn is longer by its own correction, and lines that make up for the tip take their time as well.
+            let turned: f64 = sent.iter().map(|sent| sent.ways().1).sum();
+            let longer = if turns_alone { (turned / ways.1 - 1.0).abs() + 0.02 } else { 0.01 };
+            // Under the least feed the original itself is as fast as it may be.
+            let hurried = !turns_alone && sent.iter().any(Sent::is_least);
+            if !hurried && (b - wanted).abs() > longer * wanted + open_a + open_b {
                 return fault(format!("the block takes {:.5} instead of {:.5} min", b, a));
             }
         }

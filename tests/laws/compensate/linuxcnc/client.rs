@@ -49,6 +49,10 @@ pub struct Sent {
     /// The feed in force as it is said, per minute, and the unit of its lengths, mm.
     pub rate: f64,
     pub unit: f64,
+    /// Whether one of its ends is known in inch alone.
+    pub in_inch: bool,
+    /// Whether an axis stands so near zero that its parameter says zero, and in inch, so that its call has too few digits.
+    pub vague: bool,
     /// Length of the tool that is in the spindle, mm; none before the first.
     pub tool: Option<f64>,
 }
@@ -81,7 +85,7 @@ impl Sent {
         let angle = |p: &Axes| (p[second] - round.centre[1]).atan2(p[first] - round.centre[0]);
         let sign = f64::from(round.turns.signum());
         let mut once = (sign * (angle(&self.to) - angle(&self.from))).rem_euclid(TAU);
-        if (self.to[first] - self.from[first]).hypot(self.to[second] - self.from[second]) < 1e-5 {
+        if (self.to[first] - self.from[first]).hypot(self.to[second] - self.from[second]) < 1e-4 {
             once = TAU;
         }
         sign * (once + TAU * f64::from(round.turns.abs() - 1))
@@ -110,7 +114,8 @@ impl Sent {
     pub fn time(&self) -> (f64, f64) {
         let (linear, turned) = self.ways();
         // Rounding in inch is no way.
-        let way = if linear > 5e-5 { linear / self.unit } else { turned };
+        let least = if self.in_inch { 5e-5 } else { 2e-6 };
+        let way = if linear > least { linear / self.unit } else { turned };
         let time = if way > 0.0 { way / self.rate } else { 0.0 };
         (time, time * 5.1e-5 / self.rate)
     }
@@ -209,6 +214,8 @@ struct Follower<'a> {
     tables: &'a Tables,
     unit: f64,
     at: Axes,
+    /// The unit in which that has been said.
+    stood_in: f64,
     offset: Axes,
     preset: Axes,
     counted: f64,
@@ -238,6 +245,7 @@ impl<'a> Follower<'a> {
             tables,
             unit: 1.0,
             at: [0.0; 6],
+            stood_in: 1.0,
             offset: [0.0; 6],
             preset: [0.0; 6],
             counted: 0.0,
@@ -317,7 +325,8 @@ impl<'a> Follower<'a> {
         let (offset, preset) = (self.offset, self.preset);
         let shift = std::array::from_fn(|i| offset[i] + preset[i] + if i == 2 { self.counted } else { 0.0 });
         let (from, rate, unit, tool) = (self.at, self.rate, self.unit, self.tool);
-        let moved = Sent { sort, round, from, to, shift, rate, unit, tool };
+        let in_inch = unit.max(self.stood_in) > 1.0;
+        let moved = Sent { sort, round, from, to, shift, rate, unit, in_inch, vague: false, tool };
         self.marked.last_mut().expect("one at least").push(moved);
         self.at = to;
         self.coarse = true;
@@ -325,7 +334,12 @@ impl<'a> Follower<'a> {
 
     /// Where the axes stand in program coordinates, and what G92 adds, with all digits.
     fn stand(&mut self, n: &[f64]) -> Result<(), String> {
-        let at = self.scale(n);
+        let mut at = self.scale(n);
+        let mut vague = false;
+        for i in (0..6).filter(|i| self.coarse && n[*i] == 0.0 && self.at[*i] != 0.0) {
+            at[i] = self.at[i];
+            vague |= i < 3 && self.unit > 1.0;
+        }
         if self.coarse && (0..6).any(|i| (at[i] - self.at[i]).abs() > self.digit(i)) {
             return Err(format!("the last call has {:?}, the axes stand at {at:?}", self.at));
         }
@@ -338,8 +352,10 @@ impl<'a> Follower<'a> {
         let last = self.marked.last_mut().and_then(|moves| moves.last_mut());
         if let Some(moved) = last.filter(|_| self.coarse) {
             moved.to = at;
+            moved.vague = vague;
         }
         self.at = at;
+        self.stood_in = self.unit;
         self.coarse = false;
         Ok(())
     }

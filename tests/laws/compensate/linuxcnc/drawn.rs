@@ -209,7 +209,7 @@ impl Draw<'_> {
 
     /// Puts the words of a block into a line.
     fn put(&mut self, mut words: Vec<String>) {
-        if self.chance(0.08) {
+        if self.chance(0.08) && !words[0].starts_with('/') {
             let at = self.index(words.len() + 1);
             let note = self.one_of(&["(on)", "(X1 Y2)", "( a, b )"]);
             words.insert(at, note.to_string());
@@ -296,7 +296,6 @@ impl Draw<'_> {
         self.modal(&mut words);
         let any_lost = self.lost.iter().any(|lost| *lost);
         let rapid = rapid || any_lost || self.chance(0.25);
-        self.put_motion(&mut words, if rapid { 0 } else { 1 });
         let turns_alone = !any_lost && self.chance(0.2);
         let mut named: Vec<usize> = Vec::new();
         while named.is_empty() {
@@ -307,10 +306,7 @@ impl Draw<'_> {
                 }
             }
         }
-        // A rotary axis alone may take several lines, and only marks tell whose they are.
-        if !self.kind.marked && !rapid && named.iter().all(|c| self.axes[*c].rotary) {
-            named.push(self.axis(0));
-        }
+        let stood = self.at.clone();
         let step = if self.chance(0.2) { 400.0 } else { 30.0 };
         let mut axis_words = Vec::new();
         for c in named {
@@ -323,6 +319,10 @@ impl Draw<'_> {
             let stays = if self.incremental { Some("X0".to_string()) } else { None };
             axis_words.extend(stays.inspect(|_| self.lost[c] = false));
         }
+        // A rotary axis alone may take several lines, and only marks tell whose they are.
+        let stays = (0..3).all(|i| self.at[self.axis(i)] == stood[self.axis(i)]);
+        let rapid = rapid || !self.kind.marked && stays;
+        self.put_motion(&mut words, if rapid { 0 } else { 1 });
         self.shuffle(&mut axis_words);
         words.extend(axis_words);
         if !rapid {
