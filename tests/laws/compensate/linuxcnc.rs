@@ -7,6 +7,7 @@ use super::*;
 mod any_program;
 mod by_hand;
 mod client;
+mod draw;
 mod drawn;
 
 /// Moves in what LinuxCNC's interpreter says.

@@ -314,7 +314,11 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             let digits = 0.05e-6 * 3.0 * planned.unit;
             seen.arc = seen.arc.max(worst - digits);
             if worst > ARCS + digits {
-                return fault(format!("a line is {:.3} um off its arc", worst * 1e6));
+                return fault(format!(
+                    "a line is {:.3} um off its arc ({:.3} um are told)",
+                    worst * 1e6,
+                    report.largest_arc_m.value * 1e6
+                ));
             }
         }
     }
