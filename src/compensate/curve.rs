@@ -14,7 +14,7 @@ use super::tip_error::TipError;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Motion};
 
-/// Without getting better, lines are not made shorter than by this factor.
+/// Lines are not made shorter than by this factor where the correction bends.
 const MOST_FINER: usize = 16;
 /// Most lines that take the place of one arc.
 const MOST_LINES: usize = 100_000;
@@ -56,16 +56,17 @@ pub(super) fn write(
     let Some(tolerance) = pass.options().arcs else {
         return refuse(block, motion_byte(block), CompensateFault::Arc);
     };
-    let mut count = chords(pass, block, &arc, tolerance)?;
+    let count = chords(pass, block, &arc, tolerance)?;
     // Where the correction itself bends, as near a singular pose, chords of the arc are too long. What no more lines mend is told.
-    let (mut bend, mut finer) = (bends(pass, block, &arc, count)?, count);
-    while bend > tolerance && 2 * finer <= MOST_LINES.min(MOST_FINER * count) {
+    let mut finer = count;
+    while bends(pass, block, &arc, finer)? > tolerance {
         finer *= 2;
-        let left = bends(pass, block, &arc, finer)?;
-        if left < bend {
-            (bend, count) = (left, finer);
+        if finer > MOST_LINES.min(MOST_FINER * count) {
+            finer = count;
+            break;
         }
     }
+    let count = finer;
     pass.report().split_arcs += 1;
     pass.report().arc_lines += count as u64;
     lines::write(pass, (block, motion), count, &|s| arc.at(s), Some(&arc), out)

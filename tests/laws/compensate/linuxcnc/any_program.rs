@@ -24,6 +24,7 @@ struct Seen {
     axes: usize,
     arcs: usize,
     lines: usize,
+    told: usize,
     cycles: usize,
     timed: usize,
     tip: f64,
@@ -312,6 +313,11 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             let worst = beside_arc(case, &drawn, end, sent);
             // Its centre has four digits.
             let digits = 0.05e-6 * 3.0 * planned.unit;
+            if report.largest_arc_m.value > ARCS {
+                // Told: no lines hold an arc through a singular pose.
+                seen.told += 1;
+                continue;
+            }
             seen.arc = seen.arc.max(worst - digits);
             if worst > ARCS + digits {
                 return fault(format!(
