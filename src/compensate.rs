@@ -89,6 +89,7 @@ mod lines;
 mod cycle;
 mod feed;
 mod straight;
+mod turned;
 
 mod curve;
 

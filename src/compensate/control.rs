@@ -142,6 +142,15 @@ impl<'a> Control<'a> {
         self.frame.change(block, dialect, (&self.axes, self.units), plane, place)
     }
 
+    /// By how much written numbers are smaller than program coordinates, as [`Frame::slip`].
+    pub fn slip(&self) -> Vec<f64> {
+        self.frame.slip(&self.axes)
+    }
+
+    pub fn set_slip(&mut self, axis: usize, slip: f64) {
+        self.frame.set_slip(axis, slip);
+    }
+
     /// Whether a frame tilts the direction of the tool length, which then lies along no axis; tool centre point function off.
     pub fn tilts_length(&self) -> bool {
         let tilted = !self.frame.is_straight() && !self.frame.keeps(self.length_axis);

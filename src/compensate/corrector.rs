@@ -17,6 +17,7 @@ use crate::machine::{JointKind, Machine};
 use crate::nc::{Block, Dialect, How, Number, Word};
 
 /// A number to write for an axis.
+#[derive(Clone)]
 pub(super) struct AxisNumber {
     axis: usize,
     text: String,
@@ -35,6 +36,7 @@ impl AxisNumber {
 }
 
 /// What a position needs.
+#[derive(Clone)]
 pub(super) struct Correction {
     numbers: Vec<AxisNumber>,
     written: Position,
@@ -276,9 +278,10 @@ fn number(
 ) -> f64 {
     let control = program.control();
     let now = program.written().program()[axis];
+    let slip = control.slip()[axis];
     let how = program.meaning(word.map_or(How::Modal, |w| w.how));
-    let mut value = control.programmed(axis, wanted);
-    let from = control.programmed(axis, now);
+    let mut value = control.programmed(axis, wanted - slip);
+    let from = control.programmed(axis, now - slip);
     match how {
         How::Incremental => value -= from,
         How::Shortest | How::Positive | How::Negative => value = value.rem_euclid(360.0),
@@ -287,9 +290,9 @@ fn number(
     let places = style.places(control, axis).max(word.and_then(plain).map_or(0, |n| n.decimals));
     let half = 0.500_001 * 10f64.powi(-(places as i32));
     let stands = |number: f64| match how {
-        How::Incremental => control.si(axis, from + number),
+        How::Incremental => slip + control.si(axis, from + number),
         How::Shortest | How::Positive | How::Negative => wanted + control.si(axis, number - value),
-        _ => control.si(axis, number),
+        _ => slip + control.si(axis, number),
     };
     let (text, dialect) = match word.and_then(plain) {
         Some(number) => {

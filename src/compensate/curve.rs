@@ -10,9 +10,12 @@ use super::output::put;
 use super::pass::Pass;
 use super::position::Position;
 use super::refusal::refuse;
+use super::tip_error::TipError;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Motion};
 
+/// Lines are not made shorter than by this factor where the correction bends.
+const MOST_FINER: usize = 16;
 /// Most lines that take the place of one arc.
 const MOST_LINES: usize = 100_000;
 
@@ -54,6 +57,16 @@ pub(super) fn write(
         return refuse(block, motion_byte(block), CompensateFault::Arc);
     };
     let count = chords(pass, block, &arc, tolerance)?;
+    // Where the correction itself bends, as near a singular pose, chords of the arc are too long. What no more lines mend is told.
+    let mut finer = count;
+    while bends(pass, block, &arc, finer)? > tolerance {
+        finer *= 2;
+        if finer > MOST_LINES.min(MOST_FINER * count) {
+            finer = count;
+            break;
+        }
+    }
+    let count = finer;
     pass.report().split_arcs += 1;
     pass.report().arc_lines += count as u64;
     lines::write(pass, (block, motion), count, &|s| arc.at(s), Some(&arc), out)
@@ -79,6 +92,34 @@ fn chords(pass: &Pass, block: &Block, arc: &Arc, tolerance: f64) -> Result<usize
     Ok(count)
 }
 
+/// Largest distance of the middle of a line from the arc, m, with so many lines in its place.
+fn bends(pass: &Pass, block: &Block, arc: &Arc, count: usize) -> Result<f64> {
+    let (program, control) = (pass.program(), pass.program().control());
+    let (free, ways) = (program.free(), program.open_ways());
+    let mut model = pass.corrector().model().ahead();
+    let (mut from, mut worst) = (program.written().clone(), 0.0f64);
+    let mut piece = model.piece();
+    for k in 1..=count {
+        let at = |s: f64| -> Result<(Vec<f64>, Vec<f64>)> {
+            let coordinates = arc.at(s / count as f64);
+            Ok((program.joints(block, &coordinates)?, coordinates))
+        };
+        let (q, coordinates) = at(k as f64)?;
+        model.advance(&q, &ways);
+        let sent = pass.corrector().solve_with(&model.chain_at(&q), program, &q, &free).commands;
+        let to = Position::new(sent.clone(), control.program(&sent, &coordinates));
+        // Across a reversal the correction steps, and no line is short enough.
+        let steps = std::mem::replace(&mut piece, model.piece()) != model.piece();
+        if let Some(sent) = control.between(&from, &to, 0.5).filter(|_| !steps) {
+            let goal = control.goal(&at(k as f64 - 0.5)?.0);
+            let there = model.chain_at(&q).w_from_t(&sent) * goal.t_from_tip;
+            worst = worst.max(TipError::between(there, goal.w_from_tip).m());
+        }
+        from = to;
+    }
+    Ok(worst)
+}
+
 /// Whether the correction shows in the written digits anywhere along an arc.
 fn matters(pass: &Pass, block: &Block, arc: &Arc) -> Result<bool> {
     let (program, control) = (pass.program(), pass.program().control());
@@ -95,9 +136,10 @@ fn matters(pass: &Pass, block: &Block, arc: &Arc) -> Result<bool> {
             return not_held(pass, block, model.chain(), &q, (solution.position_left_m, tolerance));
         }
         let written = control.program(&solution.commands, &coordinates);
+        let slip = control.slip();
         for i in 0..coordinates.len() {
             let half = 0.5 * 10f64.powi(-(pass.style().places(control, i) as i32));
-            let by = control.programmed(i, written[i]) - control.programmed(i, coordinates[i]);
+            let by = control.programmed(i, written[i] - slip[i]) - control.programmed(i, coordinates[i]);
             if program.places().is_placed(i) && by.abs() > half {
                 return Ok(true);
             }

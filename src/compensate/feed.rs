@@ -24,16 +24,50 @@ impl Way<'_> {
     }
 }
 
-/// Whether the meaning of `F` depends on the correction: only rotary axes are meant to move, and linear ones do.
-pub(super) fn is_upset(program: &Interpreter, motion: &Motion, meant: &Way, written: &Way) -> bool {
+/// The least feed that LinuxCNC takes a block under inverse time to have, in units of length a minute: a slower one is raised to it
+/// (`inverse_time_rate_straight` of its interpreter), and the rotary axes with it.
+const LEAST_FEED: f64 = 0.1;
+
+/// Whether the linear part of a block that turns rotary axes alone is too short for its time to be kept by inverse time.
+pub(super) fn is_too_short(program: &Interpreter, block: &Block, meant: &Way, written: &Way) -> bool {
+    let (control, axes) = (program.control(), program.control().axes());
+    if program.dialect() != Dialect::Rs274 {
+        return false;
+    }
+    let linear = |way: &Way| {
+        let by = (0..axes.len()).filter(|i| !axes[*i].is_rotary());
+        by.map(|i| control.programmed(i, way.by(i)).powi(2)).sum::<f64>().sqrt()
+    };
+    let inverse = match program.modes().feed {
+        Some(Feed::InverseTime) => feed_of(block),
+        Some(Feed::PerRevolution) => None,
+        _ => program.feed().map(|(feed, _)| feed / degrees(program, meant)),
+    };
+    inverse.is_some_and(|inverse| inverse * linear(written) < LEAST_FEED)
+}
+
+fn feed_of(block: &Block) -> Option<f64> {
+    block.words().iter().find(|w| w.address == "F").and_then(|w| w.number())
+}
+
+/// The rotary way, deg.
+fn degrees(program: &Interpreter, way: &Way) -> f64 {
+    let axes = program.control().axes();
+    let turned = (0..axes.len()).filter(|i| axes[*i].is_rotary()).map(|i| way.by(i).to_degrees().powi(2));
+    turned.sum::<f64>().sqrt()
+}
+
+/// Whether a block turns rotary axes alone at a feed, and its correction moves linear ones.
+pub(super) fn turns_alone(program: &Interpreter, motion: &Motion, meant: &Way, written: &Way) -> bool {
     let axes = program.control().axes();
     let linear = |way: &Way| (0..axes.len()).any(|i| !axes[i].is_rotary() && way.by(i).abs() > 1e-9);
     let turns = (0..axes.len()).any(|i| axes[i].is_rotary() && meant.by(i) != 0.0);
-    motion.kind != MotionKind::Rapid
-        && program.modes().feed != Some(Feed::InverseTime)
-        && turns
-        && !linear(meant)
-        && linear(written)
+    motion.kind != MotionKind::Rapid && turns && !linear(meant) && linear(written)
+}
+
+/// Whether the meaning of `F` depends on the correction: only rotary axes are meant to move, and linear ones do.
+pub(super) fn is_upset(program: &Interpreter, motion: &Motion, meant: &Way, written: &Way) -> bool {
+    program.modes().feed != Some(Feed::InverseTime) && turns_alone(program, motion, meant, written)
 }
 
 /// Writes the time of the block in the place of its feed. What stands behind the block then: the line that brings the feed back.
@@ -46,13 +80,8 @@ pub(super) fn keep_time(
     motion: &Motion,
     meant: &Way,
 ) -> Result<String> {
-    let axes = program.control().axes();
     let refused = |block: &Block| refuse(block, 0, CompensateFault::RotaryFeed);
-    let degrees = (0..axes.len())
-        .filter(|i| axes[*i].is_rotary())
-        .map(|i| meant.by(i).to_degrees().powi(2))
-        .sum::<f64>()
-        .sqrt();
+    let degrees = degrees(program, meant);
     let per_minute = !matches!(program.modes().feed, Some(Feed::PerRevolution | Feed::InverseTime));
     let Some((feed, text)) = program.feed().filter(|(feed, _)| *feed > 0.0) else { return refused(block) };
     if program.dialect() == Dialect::Heidenhain || !per_minute {

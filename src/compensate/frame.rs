@@ -15,6 +15,8 @@ pub(super) struct Frame {
     /// The part of `pose` and `shift` that `G52` gave, and the part of `G92`, by axis.
     local: Vec<f64>,
     preset: Vec<f64>,
+    /// By how much coordinates as written are smaller than those that are meant, by axis: what rounding left of the numbers of `G92`.
+    slip: Vec<f64>,
     /// `G68`: inside the shifts.
     turn: Option<Pose<f64>>,
 }
@@ -36,8 +38,26 @@ impl Frame {
             shift: vec![0.0; axes],
             local: vec![0.0; axes],
             preset: vec![0.0; axes],
+            slip: vec![0.0; axes],
             turn: None,
         }
+    }
+
+    /// By how much the numbers of a program that is written are smaller than its coordinates, by axis, m or rad.
+    pub fn slip(&self, axes: &[Axis]) -> Vec<f64> {
+        let mut outside = [0.0; 3];
+        for (axis, slip) in axes.iter().zip(&self.slip) {
+            if let Some(k) = axis.tip() {
+                outside[k] = *slip;
+            }
+        }
+        let inside = self.pose.rotation.transpose() * Vec3(outside);
+        axes.iter().zip(&self.slip).map(|(axis, slip)| axis.tip().map_or(*slip, |k| inside.0[k])).collect()
+    }
+
+    /// The number of a preset has been written smaller by `slip` than the place that it names.
+    pub fn set_slip(&mut self, axis: usize, slip: f64) {
+        self.slip[axis] = slip;
     }
 
     /// Whether nothing is turned.
@@ -175,13 +195,20 @@ impl Frame {
         };
         let values: Result<Vec<Option<f64>>, ()> = (0..count).map(value).collect();
         let Ok(values) = values else { return Change::Unknown(text) };
-        if has_g(block, 52.0) || has_g(block, 92.0) {
+        let (local, preset) = (has_g(block, 52.0), has_g(block, 92.0));
+        // Some controls keep both apart, to others they are one and the same.
+        let in_force = |shift: &[f64]| shift.iter().any(|by| *by != 0.0);
+        let presets = preset || has_g(block, 92.1) || has_g(block, 92.2);
+        if local && in_force(&self.preset) || presets && in_force(&self.local) {
+            return Change::Unknown(text);
+        }
+        if local || preset {
             if self.turn.is_some() {
                 return Change::Unknown(text);
             }
             for (i, value) in values.into_iter().enumerate() {
                 let Some(value) = value else { continue };
-                if has_g(block, 52.0) {
+                if local {
                     self.local[i] = value;
                 } else {
                     let Some(now) = place[i] else { return Change::Unplaced(i) };
@@ -193,6 +220,7 @@ impl Frame {
                 return Change::Unknown(text);
             }
             self.preset = vec![0.0; count];
+            self.slip = vec![0.0; count];
         } else if has_g(block, 68.0) {
             let (normal, first, second) = match plane {
                 None | Some(Plane::Xy) => (2, "X", "Y"),

@@ -404,6 +404,11 @@ impl<'a> Interpreter<'a> {
         Ok(Event::Move { motion, target, drills })
     }
 
+    /// The number of a preset has been written smaller by so much, m or rad, than the place that it names.
+    pub fn set_slip(&mut self, axis: usize, slip: f64) {
+        self.control.set_slip(axis, slip);
+    }
+
     /// Takes a position as reached.
     pub fn arrive(&mut self, meant: Position, written: Position) {
         (self.meant, self.written) = (meant, written);

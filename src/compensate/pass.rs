@@ -25,7 +25,7 @@ use crate::chain::Chain;
 use crate::error::Result;
 use crate::inverse::{Outcome, Solution};
 use crate::machine::JointKind;
-use crate::nc::{Block, Motion, MotionKind};
+use crate::nc::{Block, Motion, MotionKind, Number};
 
 /// Whole turns are told from others within this, rad; lengths from none, m.
 const NO_WAY: f64 = 1e-9;
@@ -121,15 +121,22 @@ impl<'a> Pass<'a> {
 
     /// Adds to the numbers of a preset what the machine stands beside the place that is meant.
     fn put_preset(&mut self, block: &mut Block, words: &[(usize, usize, f64)]) -> Result<()> {
-        let control = self.program.control();
         for &(word, axis, by) in words {
+            let control = self.program.control();
             let Some(number) = plain(&block.words()[word]) else { continue };
             let places = self.style.places(control, axis).max(number.decimals);
-            let text = number.write_like(number.value + control.programmed(axis, by), Some(places));
-            if (control.programmed(axis, by)).abs() > 0.500_001 * 10f64.powi(-(places as i32)) {
+            let by = control.programmed(axis, by);
+            let text = number.write_like(number.value + by, Some(places));
+            let mut left = by;
+            if by.abs() > 0.500_001 * 10f64.powi(-(places as i32)) {
+                let dialect = self.program.dialect();
+                let written = Number::parse(text.as_bytes(), dialect).map_or(number.value + by, |n| n.value);
+                left = number.value + by - written;
                 block.replace(word, &self.style.pointed(&text))?;
                 self.report.corrected_words += 1;
             }
+            let left = control.si(axis, left);
+            self.program.set_slip(axis, left);
         }
         Ok(())
     }

@@ -62,9 +62,14 @@ impl<'a> Pieces<'a> {
     }
 }
 
+/// A thousandth of the smallest step that programs write. What a joint differs by less is the rounding of frames that were called otherwise,
+/// and no way.
+const NO_WAY: f64 = 1e-10;
+
 /// Nothing has moved yet.
 pub(super) fn at_rest(calibrated: &CalibratedMachine, first: &[i8]) -> Tracker {
-    Tracker::new(calibrated.variation().dead_bands.clone(), first.to_vec())
+    let dead_bands = calibrated.variation().dead_bands.iter().map(|band| band.max(NO_WAY)).collect();
+    Tracker::new(dead_bands, first.to_vec())
 }
 
 impl Model for Pieces<'_> {

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 
+use super::code::acts_behind;
 use super::fault::CompensateFault;
 use super::feed::{self, Way};
 use super::lines;
@@ -9,6 +10,7 @@ use super::output::{put, put_bytes};
 use super::pass::Pass;
 use super::position::Position;
 use super::refusal::refuse;
+use super::turned;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Motion, MotionKind};
 
@@ -57,6 +59,14 @@ pub(super) fn write(
         }
     }
     let correction = pass.correct(block, end.q(), Some(&motion.words))?;
+    let ways = [Way { from: &meant, to: &end }, Way { from: &written, to: correction.written() }];
+    if feed::turns_alone(pass.program(), motion, &ways[0], &ways[1])
+        && feed::is_too_short(pass.program(), block, &ways[0], &ways[1])
+        && !acts_behind(block)
+    {
+        let written = (&written, correction.written());
+        return turned::write(pass, (block, motion), (&meant, &end), written, out);
+    }
     pass.restate(block, motion)?;
     pass.put_words(block, motion, &correction)?;
     if feeds && known {

@@ -290,7 +290,10 @@ fn compare<A: BufRead, B: BufRead>(
         found.moves += 1;
         let path: Vec<Vec3<f64>> =
             from.into_iter().chain(leg.tips.iter().map(|pose| pose.translation)).collect();
-        let count = counterpart(&leg, &path, written, options)?;
+        let mut count = counterpart(&leg, &path, written, options)?;
+        while stays(&leg, meant.ahead(0)?, written.ahead(count)?, options) {
+            count += 1;
+        }
         let own: Vec<Leg> = written.ahead.drain(..count.min(written.ahead.len())).collect();
         from = leg.tips.last().map(|pose| pose.translation);
         let line = leg.line;
@@ -354,6 +357,19 @@ fn counterpart<R: BufRead>(
         count += 1;
     }
     Ok(1)
+}
+
+/// Whether a written move still belongs to `leg`: it ends where that does, and not where the next one does.
+fn stays(leg: &Leg, next: Option<&Leg>, piece: Option<&Leg>, options: &VerifyOptions) -> bool {
+    let Some(tip) = piece.filter(|piece| piece.sort == Sort::Straight).and_then(|piece| piece.tips.last())
+    else {
+        return false;
+    };
+    let ends = |leg: &Leg| {
+        leg.sort == Sort::Straight
+            && leg.tips.last().is_some_and(|goal| off(leg.sort, goal, tip) <= options.tolerance)
+    };
+    ends(leg) && !next.is_some_and(ends)
 }
 
 /// How far a tip is from its goal, m; of a cycle only across the tool axis.

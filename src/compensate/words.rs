@@ -47,9 +47,20 @@ pub(super) fn line(
     numbers: &[AxisNumber],
     model: Option<Number>,
     separator: &str,
+    habits: (&Style, &Control),
+) -> String {
+    line_of(numbers, &vec![true; habits.1.axes().len()], model, separator, habits)
+}
+
+/// As [`line`], of these axes alone.
+pub(super) fn line_of(
+    numbers: &[AxisNumber],
+    of: &[bool],
+    model: Option<Number>,
+    separator: &str,
     (style, control): (&Style, &Control),
 ) -> String {
-    let mut sorted: Vec<&AxisNumber> = numbers.iter().collect();
+    let mut sorted: Vec<&AxisNumber> = numbers.iter().filter(|n| of[n.axis()]).collect();
     sorted.sort_by_key(|n| n.axis());
     let words = sorted.into_iter().map(|number| {
         let address = control.axes()[number.axis()].address();

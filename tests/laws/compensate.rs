@@ -16,6 +16,7 @@ use proptest::prelude::*;
 use crate::common::machine;
 
 mod any;
+mod clients;
 mod constructs;
 mod linuxcnc;
 mod pieces;
@@ -248,11 +249,14 @@ fn frames_compose() {
     for k in 0..3 {
         assert!((a[k] - turned[k]).abs() < 3e-6, "{a:?} {b:?}");
     }
-    let shifted = "G90\nG0 X10 Y-20 Z30 B30 C40\nG92 X0\nG52 Y5\nG1 X50 Y30 Z12\n";
     let straight = "G90\nG0 X10 Y-20 Z30 B30 C40\nG1 X60 Y35 Z12\n";
-    let (a, b) = (last(straight), last(shifted));
-    let moved = [b[0] + 10.0, b[1] + 5.0, b[2]];
-    assert!((0..3).all(|k| (a[k] - moved[k]).abs() < 3e-6), "{a:?} {b:?}");
+    let a = last(straight);
+    for shift in ["G92 X0 Y-25", "G52 X10 Y5"] {
+        let shifted = format!("G90\nG0 X10 Y-20 Z30 B30 C40\n{shift}\nG1 X50 Y30 Z12\n");
+        let b = last(&shifted);
+        let moved = [b[0] + 10.0, b[1] + 5.0, b[2]];
+        assert!((0..3).all(|k| (a[k] - moved[k]).abs() < 3e-6), "{a:?} {b:?}");
+    }
     let turned = "G90\nG0 X10 Y-20 Z30 B30 C40\nG68 X10 Y0 R90\nG1 X45 Y-50 Z12\nG69\n";
     let b = last(turned);
     let back = [10.0 - b[1], b[0] - 10.0, b[2]];

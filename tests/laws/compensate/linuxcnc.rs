@@ -4,6 +4,12 @@ use std::process::Command;
 
 use super::*;
 
+mod any_program;
+mod by_hand;
+mod client;
+mod draw;
+mod drawn;
+
 /// Moves in what LinuxCNC's interpreter says.
 fn canonical_moves(text: &str) -> (usize, usize) {
     static NUMBER: std::sync::atomic::AtomicUsize = std::sync::atomic::AtomicUsize::new(0);
@@ -13,8 +19,15 @@ fn canonical_moves(text: &str) -> (usize, usize) {
     let (program, tools) = (folder.join("part.ngc"), folder.join("tool.tbl"));
     std::fs::write(&program, text).expect("writable");
     std::fs::write(&tools, "T1 P1 Z40 D6\n").expect("writable");
-    let out =
-        Command::new("rs274").arg("-g").arg("-t").arg(&tools).arg(&program).current_dir(&folder).output();
+    let out = Command::new("rs274")
+        .arg("-g")
+        .arg("-t")
+        .arg(&tools)
+        .arg(&program)
+        .current_dir(&folder)
+        // Where it shares its tools with other processes.
+        .env("HOME", &folder)
+        .output();
     let _ = std::fs::remove_dir_all(&folder);
     let out = out.unwrap_or_else(|e| panic!("rs274, the interpreter of LinuxCNC, does not start: {e}"));
     let text = String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
