@@ -117,6 +117,7 @@ pub use report::{
     Unseen, UnseenPattern, UnseenPiece, Worst,
 };
 pub use setup::{Setup, ToolAxis};
+#[cfg(feature = "cli")]
 pub(crate) use verify::verify_written;
 pub use verify::{Departure, Verification, VerifyOptions, verify, verify_text};
 

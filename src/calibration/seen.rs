@@ -19,7 +19,7 @@ impl CalibratedMachine {
     /// By how much a command lies beyond the range that the calibration has seen, m or rad, if by more than 1 % of that range. Whole turns
     /// do not count where the machine is the same after them.
     ///
-    /// `command`: index in [`Machine::commands`]; `q`: m or rad.
+    /// `command`: index in [`Machine::commands`](crate::machine::Machine::commands); `q`: m or rad.
     pub fn beyond(&self, command: usize, q: f64) -> Option<f64> {
         let (from, to) = self.seen.get(command).copied().flatten()?;
         let slack = 0.01 * (to - from) + 1e-9;

@@ -409,7 +409,7 @@ fn notes(r: &Report) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::compensate::Reversal;
+    use crate::compensate::{Reversal, Worst};
 
     use super::*;
 

@@ -344,9 +344,9 @@ impl<'a> Follower<'a> {
             return Err(format!("the last call has {:?}, the axes stand at {at:?}", self.at));
         }
         let own: Axes = std::array::from_fn(|i| n[6 + i] * if i < 3 { INCH } else { 1.0 });
-        for i in 0..6 {
-            if (own[i] - self.preset[i]).abs() < 3e-3 {
-                self.preset[i] = own[i];
+        for (preset, own) in self.preset.iter_mut().zip(own) {
+            if (own - *preset).abs() < 3e-3 {
+                *preset = own;
             }
         }
         let last = self.marked.last_mut().and_then(|moves| moves.last_mut());
