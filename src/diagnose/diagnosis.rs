@@ -83,6 +83,14 @@ pub struct Diagnosis {
     pub location_errors: LocationErrors,
 }
 
+impl Diagnosis {
+    /// Whether the model has anything beside constant geometry: what was found, or parts of what has no name.
+    pub fn has_more_than_geometry(&self) -> bool {
+        let parts = self.unexplained.iter().flat_map(|unexplained| &unexplained.parts);
+        !self.findings.is_empty() || parts.into_iter().any(|part| part.modelled)
+    }
+}
+
 /// An effect that was found, as it is put into the model.
 #[derive(Clone, Debug)]
 pub(super) struct Named {

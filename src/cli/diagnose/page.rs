@@ -58,7 +58,7 @@ pub(crate) fn page(diagnosis: &Diagnosis) -> String {
                     @if let Some(curve) = &traces.unexplained { (against(curve, None, most)) }
                 }
                 h2 { "The recordings" }
-                @for trace in &traces.recordings { (along(trace, !diagnosis.findings.is_empty(), most)) }
+                @for trace in &traces.recordings { (along(trace, diagnosis.has_more_than_geometry(), most)) }
                 h2 { "What is left" }
                 @for angle in [false, true] { (left(diagnosis, angle)) }
                 (geometry(&diagnosis.location_errors))

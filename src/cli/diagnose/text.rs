@@ -128,7 +128,7 @@ pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
     for (noise, angle) in both(diagnosis.noise_floor.m, diagnosis.noise_floor.rad) {
         lines.push(format!("noise of the readings: {}", amount(noise, angle)));
     }
-    let found = !diagnosis.findings.is_empty();
+    let found = diagnosis.has_more_than_geometry();
     for (rms, angle) in both(diagnosis.rms.m, diagnosis.rms.rad) {
         let RmsByModel { nominal, geometric, r#final } = rms;
         let mut line = format!(
@@ -137,7 +137,7 @@ pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
             amount(geometric, angle)
         );
         if found {
-            let _ = write!(line, " -> {} with what is named below", amount(r#final, angle));
+            let _ = write!(line, " -> {} with what is {} below", amount(r#final, angle), said(diagnosis));
         }
         lines.push(line);
     }
@@ -161,7 +161,7 @@ pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
 
 /// What is left of every set-up when the others alone say what the machine is like.
 fn set_ups(diagnosis: &Diagnosis) -> Vec<String> {
-    let found = !diagnosis.findings.is_empty();
+    let found = diagnosis.has_more_than_geometry();
     let mut lines = Vec::new();
     for one in &diagnosis.set_ups_left_out {
         for (LeftOutRms { geometric, r#final, placebo }, angle) in both(one.rms.m, one.rms.rad) {
@@ -173,12 +173,22 @@ fn set_ups(diagnosis: &Diagnosis) -> Vec<String> {
                 let _ = write!(line, " ({} with placebos)", amount(placebo, angle));
             }
             if found && r#final > WORSE * geometric {
-                line += ": what is named below does not hold there";
+                let _ = write!(line, ": what is {} below does not hold there", said(diagnosis));
             }
             lines.push(line);
         }
     }
     lines
+}
+
+/// What is done with what the model has beside geometry.
+fn said(diagnosis: &Diagnosis) -> &'static str {
+    let nameless = diagnosis.unexplained.as_ref().is_some_and(|u| u.parts.iter().any(|part| part.modelled));
+    match (diagnosis.findings.is_empty(), nameless) {
+        (false, false) => "named",
+        (false, true) => "named and modelled",
+        (true, _) => "modelled",
+    }
 }
 
 /// A meaningless cause that explains this part as much is told.
@@ -208,8 +218,8 @@ fn outliers(diagnosis: &Diagnosis) -> Vec<String> {
     let (m, rad) = (diagnosis.rms_without_outliers.m, diagnosis.rms_without_outliers.rad);
     for (rms, angle) in both(m, rad) {
         let mut line = format!("RMS without the outliers: {} with geometry", amount(rms.geometric, angle));
-        if !diagnosis.findings.is_empty() {
-            let _ = write!(line, " -> {} with what is named below", amount(rms.r#final, angle));
+        if diagnosis.has_more_than_geometry() {
+            let _ = write!(line, " -> {} with what is {} below", amount(rms.r#final, angle), said(diagnosis));
         }
         lines.push(line);
     }
