@@ -85,7 +85,7 @@ impl Sent {
         let angle = |p: &Axes| (p[second] - round.centre[1]).atan2(p[first] - round.centre[0]);
         let sign = f64::from(round.turns.signum());
         let mut once = (sign * (angle(&self.to) - angle(&self.from))).rem_euclid(TAU);
-        if (self.to[first] - self.from[first]).hypot(self.to[second] - self.from[second]) < 1e-4 {
+        if self.is_closed() {
             once = TAU;
         }
         sign * (once + TAU * f64::from(round.turns.abs() - 1))
@@ -103,6 +103,12 @@ impl Sent {
                 ((r * self.sweep()).hypot(by[3 - first - second]), norm(&by[3..]))
             }
         }
+    }
+
+    /// Whether it is a full circle: how long one is under inverse time is a matter of rounding to the interpreter.
+    pub fn is_closed(&self) -> bool {
+        let Some(Round { plane: [first, second], .. }) = self.round else { return false };
+        (self.to[first] - self.from[first]).hypot(self.to[second] - self.from[second]) < 1e-4
     }
 
     /// Whether the interpreter has raised the feed of a block under G93 to the least that it knows, a tenth of a unit a minute.
