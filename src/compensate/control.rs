@@ -106,6 +106,11 @@ impl<'a> Control<'a> {
         self.normal
     }
 
+    /// Direction in which the tool length counts: component of the tip.
+    pub fn length_axis(&self) -> usize {
+        self.length_axis
+    }
+
     /// By axis: whether it is one of the two linear axes of the plane.
     pub fn in_plane(&self) -> Vec<bool> {
         self.axes.iter().map(|a| a.tip().is_some_and(|k| k != self.normal)).collect()

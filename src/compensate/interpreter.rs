@@ -232,7 +232,7 @@ impl<'a> Interpreter<'a> {
                 self.leave_for_tool();
             } else {
                 // Some controls go by the new length at once.
-                self.leave_normal();
+                self.leave_along(self.control.length_axis());
             }
         }
         if changed || tool {
@@ -324,8 +324,12 @@ impl<'a> Interpreter<'a> {
 
     /// The axis of the tool length is behind a cycle wherever the cycle leaves it.
     pub fn leave_normal(&mut self) {
-        let normal = self.control.normal();
-        for (i, _) in self.control.axes().iter().enumerate().filter(|(_, a)| a.tip() == Some(normal)) {
+        self.leave_along(self.control.normal());
+    }
+
+    /// The axis of this component of the tip is somewhere else.
+    fn leave_along(&mut self, component: usize) {
+        for (i, _) in self.control.axes().iter().enumerate().filter(|(_, a)| a.tip() == Some(component)) {
             self.places.lose(i);
         }
     }

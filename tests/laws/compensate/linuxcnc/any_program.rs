@@ -253,7 +253,7 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             report.unknown_places.first.iter().map(|u| u.line).collect(),
             planned.line,
         );
-        let starts_known = std::mem::replace(&mut knows, planned.known);
+        let starts_known = std::mem::replace(&mut knows, planned.known && !unknown);
         let vague = meant.iter().chain(sent).any(|sent| sent.vague);
         if !(planned.known || planned.sort == Sort::Cycle) || unknown || turns || vague {
             continue;
@@ -315,11 +315,11 @@ fn ask(case: &Case, kind: Kind, random: &mut Random, seen: &mut Seen) -> Result<
             |moves: &[Sent]| moves.iter().map(Sent::time).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         let (ways, feeds) = (end.ways(), end.sort == client::Sort::Feed);
         let turns_alone = ways.0 < 5e-5 && ways.1 > 1e-3;
+        // What the interpreter itself hurries, or counts otherwise.
+        let left_open = end.is_least() || planned.inverse_time && end.is_closed();
+        let bent = singular || starts_singular;
         if feeds
-            && !end.is_least()
-            && !(planned.inverse_time && end.is_closed())
-            && !singular
-            && !starts_singular
+            && !(left_open || bent)
             && meant.len() == 1
             && (turns_alone || planned.inverse_time || ways.0 > 5.0)
         {
