@@ -6,7 +6,7 @@ use super::arc::Arc;
 use super::code::acts_behind;
 use super::corrector::Correction;
 use super::fault::CompensateFault;
-use super::motion_word::{motion_byte, straighten};
+use super::motion_word::{motion_byte, motion_word, straighten};
 use super::output::put_bytes;
 use super::pass::Pass;
 use super::position::Position;
@@ -15,7 +15,7 @@ use super::style::{model_of, plain};
 use super::words;
 use crate::chain::Chain;
 use crate::error::Result;
-use crate::nc::{Block, Feed, Motion, MotionKind, Number};
+use crate::nc::{Block, Feed, Motion, MotionKind, Number, Word};
 
 /// How the lines look beside their axis words.
 struct Form {
@@ -29,14 +29,20 @@ struct Form {
     last: bool,
     /// Feed that every line has for itself: the word in the block, and its number.
     feed: Option<(usize, String)>,
-    /// Behind the first of the lines that stand before the block: its feed as it is.
+    /// What the first of the lines that stand before the block takes over from it: its modes, `G90`, before all else, and its feed
+    /// behind.
+    modes: Vec<String>,
     carried: Option<String>,
 }
 
 impl Form {
     fn of(block: &Block, motion: &Motion, count: usize, inverse_time: bool) -> Form {
         let word = block.words().iter().find(|w| w.address == "F");
+        let moves = motion_word(block);
+        let is_mode = |(i, w): &(usize, &Word)| w.address == "G" && Some(*i) != moves;
+        let modes = block.words().iter().enumerate().filter(is_mode).map(|(_, w)| block.text(&w.span));
         Form {
+            modes: modes.collect(),
             model: model_of(block, &motion.words),
             separator: motion.words.iter().flatten().next().map_or(" ", |w| block.separator(*w)),
             ending: if block.bytes().ends_with(b"\r\n") { "\r\n" } else { "\n" },
@@ -50,7 +56,8 @@ impl Form {
     /// A line with these axis words; `k`: its number from 1, of `count`.
     fn line(&self, mut text: String, k: usize, count: usize) -> String {
         if self.last && k == 1 {
-            let words = ["G1".to_string(), text].into_iter().chain(self.carried.clone());
+            let words =
+                self.modes.iter().cloned().chain(["G1".to_string(), text]).chain(self.carried.clone());
             text = words.collect::<Vec<_>>().join(self.separator);
         }
         if let Some((_, number)) = &self.feed {

@@ -140,3 +140,13 @@ fn a_model_is_not_continued_far_beyond_what_it_has_seen() {
         .with_deviations(random_deviations(calibrated.machine(), 1.0, 1));
     assert!(run(&square, "G21 G90\nG1 X400. Y0. C0. F500\n", &options).1.extrapolated_moves == 1);
 }
+
+#[test]
+fn lines_before_a_block_that_ends_the_program_take_its_modes_over() {
+    let calibrated = erroneous("ac_table_tilting", 1.0);
+    let text =
+        "G21 G90\nG0 X30. Y0. Z40. A20. C10.\nG91\nG1 X5. F500.\nG90 G3 X0. Y35. I-35. J0. F600. M30\n";
+    let (out, _) = run(&calibrated, text, &CompensateOptions::default().with_arcs(5e-6));
+    let found = verified(&calibrated, (text, &out), &VerifyOptions::default());
+    assert!(found.holds() && found.judged == 3, "{found:?}\n{out}");
+}
