@@ -1,10 +1,14 @@
 //! Sums of weighted sines and cosines at many frequencies at once.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-use rustfft::FftPlanner;
+use rustfft::algorithm::Radix4;
+use rustfft::algorithm::butterflies::{Butterfly12, Butterfly24};
 use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftDirection};
 
 use crate::scalar::sines_cosines;
 
@@ -66,8 +70,8 @@ const WIDEST: f64 = 8192.0;
 const PADDED: usize = 8;
 
 thread_local! {
-    /// Keeps what transforms of one length have in common.
-    static PLANNER: RefCell<FftPlanner<f64>> = RefCell::new(FftPlanner::new());
+    /// The transforms so far, by length.
+    static TRANSFORMS: RefCell<HashMap<usize, Radix4<f64>>> = RefCell::new(HashMap::new());
 }
 
 impl Band {
@@ -91,7 +95,9 @@ impl Band {
             both[index] += weight * (1.0 - part);
             both[index + 1] += weight * part;
         }
-        PLANNER.with_borrow_mut(|planner| planner.plan_fft_forward(length)).process(&mut both);
+        TRANSFORMS.with_borrow_mut(|known| {
+            known.entry(length).or_insert_with(|| transform(length)).process(&mut both);
+        });
         Band { middle, step: TAU / (length as f64 * cell), both, cell }
     }
 
@@ -110,6 +116,22 @@ impl Band {
 fn fast(least: usize) -> usize {
     let two = least.next_power_of_two();
     if two.is_multiple_of(4) && 3 * (two / 4) >= least { 3 * (two / 4) } else { two }
+}
+
+/// The transform of a length that [`fast`] gives.
+///
+/// rustfft's planner would compile its algorithms for every length and every set of instructions, a third of all code of this crate.
+fn transform(length: usize) -> Radix4<f64> {
+    let direction = FftDirection::Forward;
+    if length.is_power_of_two() {
+        return Radix4::new(length, direction);
+    }
+    let twos = length.trailing_zeros();
+    let base: Arc<dyn Fft<f64>> = match twos % 2 {
+        0 => Arc::new(Butterfly12::new(direction)),
+        _ => Arc::new(Butterfly24::new(direction)),
+    };
+    Radix4::new_with_base((twos - 2) / 2, base)
 }
 
 #[cfg(test)]
