@@ -140,7 +140,7 @@ fn medians<const N: usize>(figures: &[[f64; N]]) -> [f64; N] {
 
 #[test]
 fn more_directions_predict_better_on_the_papers_path_and_compensate_it() {
-    more_directions_predict_better(0..3);
+    more_directions_predict_better(0..1);
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn so_they_do_on_twenty_tables() {
     assert!(both <= 0.83, "{both} um");
 }
 
-/// The paper's comparison of models on its own path, medians of these tables: prediction errors of No-FR, C-FR and AC-FR, um.
+/// The paper's comparison of models on its own path, medians over these tables: prediction errors of No-FR, C-FR and AC-FR, um.
 fn more_directions_predict_better(tables: Range<u64>) -> [f64; 3] {
     let machine = common::machine("ac_table_tilting_paper");
     let [nc, longer] = [0.1, 0.15].map(|length| path(&machine, length, Bar::Machine, None, 600));
