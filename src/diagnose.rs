@@ -25,6 +25,7 @@ mod leftover;
 mod linear;
 mod marginal;
 mod model;
+mod names;
 mod noise;
 mod not_tried;
 mod odds;
@@ -65,6 +66,7 @@ inner! {
 pub use approaches::{SaidBy, StandsStill};
 pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
 pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};
+pub use names::LikelyName;
 pub use not_tried::NotTried;
 pub use outliers::{Outliers, WithoutOutliers};
 pub use parts::UnnamedPart;

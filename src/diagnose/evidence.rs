@@ -76,9 +76,8 @@ pub(super) fn evidence(
         beyond.push(log - (SIZES.len() as f64).ln());
     }
     if !beyond.is_empty() {
-        let most = beyond.iter().copied().fold(worth.evidence, f64::max);
-        let sum: f64 = beyond.iter().chain([&worth.evidence]).map(|l| (l - most).exp()).sum();
-        worth.evidence = most + sum.ln();
+        beyond.push(worth.evidence);
+        worth.evidence = log_sum_exp(&beyond);
     }
     worth
 }
@@ -105,11 +104,16 @@ pub(super) fn likely_part(gram: &DMatrix<f64>, g: &DVector<f64>, overdispersion:
 
 /// `ln` of the mean of exponentials.
 pub(super) fn log_mean_exp(logs: &[f64]) -> f64 {
+    log_sum_exp(logs) - (logs.len() as f64).ln()
+}
+
+/// `ln` of the sum of exponentials.
+pub(super) fn log_sum_exp(logs: &[f64]) -> f64 {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     if !most.is_finite() {
         return f64::NEG_INFINITY;
     }
-    most + (logs.iter().map(|l| (l - most).exp()).sum::<f64>() / logs.len() as f64).ln()
+    most + logs.iter().map(|l| (l - most).exp()).sum::<f64>().ln()
 }
 
 #[cfg(test)]

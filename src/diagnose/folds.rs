@@ -1,15 +1,22 @@
 //! Held-out figures: what the model predicts on stretches that took no part in its fit.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
 use super::finding::HeldOutPair;
 use super::marginal::gram;
 use super::search::{ModelTerm, Search, all_but};
+use crate::feature::Samples;
 use crate::units::{ByQuantity, Quantity};
 
 /// Every recording is cut into so many stretches of consecutive samples; a fold leaves one of each out.
 const FOLDS: usize = 5;
+/// So many groups of recordings are left out at most.
+const MOST_RECORDINGS: usize = 10;
+/// Extents of one joint in two recordings that differ by less than this part of them are those of one motion.
+const SAME: f64 = 1e-3;
 
 /// Fits coefficients (geometry and effects, on the linearised model) with each fold left out in turn, and puts what is left there
 /// into the diagnosis. Nonlinear parameters and the choice of effects stay as all samples gave them.
@@ -44,27 +51,58 @@ pub(super) fn pair(search: &Search, told: &[ModelTerm], i: usize) -> ByQuantity<
     })
 }
 
-/// By how much the whitened squares of stretches that are left out fall with effect `i`, and the standard error of that, from how much the
-/// stretches differ. `None` where there are too few rows.
+/// By how much the squares of stretches that are left out fall with effect `i`, in units of their mean without it, and the standard error
+/// of that, from how much the stretches differ. `None` where there are too few rows.
+///
+/// Of the readings as they are: who predicts has no reading before the one that he predicts, and so no use for what noise remembers.
 pub(super) fn gain(search: &Search, in_model: &[ModelTerm], i: usize) -> Option<(f64, f64)> {
-    let folds = Folds::new(search, in_model)?;
-    let white = |takes: &dyn Fn(usize) -> bool| {
-        let left = folds.left_out(search, takes);
-        let mut white = vec![0.0; left.len()];
-        search.rows.whitener.apply(&left, &mut white);
-        white
-    };
-    let (without, with) = (white(&|effect| effect != i), white(&|_| true));
-    let mut cells = Vec::new();
-    for span in &search.rows.linear.spans {
-        for fold in 0..FOLDS {
-            let rows = (span.rows.0..span.rows.1).filter(|row| folds.owner[*row] == fold);
-            cells.push(rows.map(|row| without[row] * without[row] - with[row] * with[row]).sum::<f64>());
+    Some(Folds::new(search, in_model)?.gain(search, i))
+}
+
+/// The same of whole recordings, which follow paths of their own; those of one motion, read by several instruments, belong together. `None`
+/// where there is one motion only.
+pub(super) fn gain_elsewhere(search: &Search, in_model: &[ModelTerm], i: usize) -> Option<(f64, f64)> {
+    let linear = search.rows.linear;
+    let mut owner = vec![0; linear.residual.len()];
+    let mut motions: Vec<Vec<Option<(f64, f64)>>> = Vec::new();
+    for (span, samples) in linear.spans.iter().zip(&linear.samples) {
+        let own = extents(samples);
+        let known = motions.iter().position(|other| is_one_motion(&own, other));
+        let number = known.unwrap_or(motions.len());
+        if known.is_none() {
+            motions.push(own);
         }
+        owner[span.rows.0..span.rows.1].fill(number % MOST_RECORDINGS);
     }
-    let (count, sum) = (cells.len() as f64, cells.iter().sum::<f64>());
-    let spread = cells.iter().map(|x| (x - sum / count).powi(2)).sum::<f64>() / (count - 1.0);
-    Some((sum, (count * spread).sqrt()))
+    if motions.len() < 2 {
+        return None;
+    }
+    Some(Folds::of(search, in_model, owner)?.gain(search, i))
+}
+
+/// Where each joint of a recording has been, least and greatest.
+fn extents(samples: &Samples) -> Vec<Option<(f64, f64)>> {
+    let extent = |q: &[f64]| q.iter().fold((f64::MAX, f64::MIN), |(l, h), q| (l.min(*q), h.max(*q)));
+    samples.joints.iter().map(|joint| joint.as_ref().map(|joint| extent(&joint.position))).collect()
+}
+
+/// Whether all joints have been in the same places, rows that one of two recordings lacks aside.
+fn is_one_motion(a: &[Option<(f64, f64)>], b: &[Option<(f64, f64)>]) -> bool {
+    let is_near = |a: &(f64, f64), b: &(f64, f64)| {
+        let most = SAME * (a.1 - a.0).max(b.1 - b.0);
+        (a.0 - b.0).abs() <= most && (a.1 - b.1).abs() <= most
+    };
+    a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| is_near(a, b))
+}
+
+/// Which part of the squares of left-out stretches is left with all effects, against what the first of them leave; each quantity in units of
+/// its mean with these. `None` where there are too few rows.
+pub(super) fn remaining(search: &Search, in_model: &[ModelTerm], first: usize) -> Option<f64> {
+    let folds = Folds::new(search, in_model)?;
+    let before = folds.left_out(search, &|effect| effect < first);
+    let (fall, _) = folds.fall(search, &before, &folds.left_out(search, &|_| true));
+    let used = search.rows.whitener.out.iter().filter(|out| !**out).count();
+    Some(1.0 - fall / used.max(1) as f64)
 }
 
 /// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
@@ -206,7 +244,7 @@ fn grams(
         let residual = residual.select_rows(&own);
         (gram(&columns, &columns), columns.tr_mul(&residual))
     };
-    (0..FOLDS).map(one).collect()
+    (0..=owner.iter().copied().max().unwrap_or(0)).map(one).collect()
 }
 
 /// What predicts stretches that were left out no worse: effects without which their mean square would fall by more than this factor
@@ -267,8 +305,13 @@ impl Part {
 }
 
 impl Folds {
-    /// `None` where there are too few rows, or a column cannot be built.
+    /// Stretches of every recording; `None` where there are too few rows, or a column cannot be built.
     fn new(search: &Search, told: &[ModelTerm]) -> Option<Self> {
+        Self::of(search, told, owners(search)?)
+    }
+
+    /// `owner`: the fold of each row.
+    fn of(search: &Search, told: &[ModelTerm], owner: Vec<usize>) -> Option<Self> {
         let rows = search.rows;
         let linear = rows.linear;
         let mut raw = linear.constant.clone();
@@ -287,11 +330,38 @@ impl Folds {
                 put(&states.raw(rows), Part::InitialCondition(i));
             }
         }
-        let owner = owners(search)?;
         let mut white = raw.clone();
         rows.whiten(&mut white);
         let grams = grams(&white, &rows.residual, &owner);
         Some(Folds { raw, part, owner, grams })
+    }
+
+    /// By how much the squares of what is left out fall with effect `i`, in units of their mean without it, and the standard error of that.
+    fn gain(&self, search: &Search, i: usize) -> (f64, f64) {
+        self.fall(search, &self.left_out(search, &|effect| effect != i), &self.left_out(search, &|_| true))
+    }
+
+    /// By how much squares fall from one model to another, in units of their mean under the first, and the standard error of that.
+    fn fall(&self, search: &Search, without: &[f64], with: &[f64]) -> (f64, f64) {
+        let linear = search.rows.linear;
+        let used = |row: &usize| !search.rows.whitener.out[*row];
+        let means = ByQuantity::of(|quantity| {
+            let of = |row: &usize| linear.angle[*row] == (quantity == Quantity::Angle);
+            let rows: Vec<usize> = (0..without.len()).filter(used).filter(of).collect();
+            let squares: f64 = rows.iter().map(|row| without[*row].powi(2)).sum();
+            (squares / rows.len().max(1) as f64).max(f64::MIN_POSITIVE)
+        });
+        let mean = |row: usize| if linear.angle[row] { means.rad } else { means.m };
+        let mut cells: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        for (number, span) in linear.spans.iter().enumerate() {
+            for row in (span.rows.0..span.rows.1).filter(used) {
+                let fall = (without[row].powi(2) - with[row].powi(2)) / mean(row);
+                *cells.entry((number, self.owner[row])).or_default() += fall;
+            }
+        }
+        let (count, sum) = (cells.len() as f64, cells.values().sum::<f64>());
+        let spread = cells.values().map(|x| (x - sum / count).powi(2)).sum::<f64>() / (count - 1.0);
+        (sum, (count * spread).sqrt())
     }
 
     /// By which factor the mean square of what is left out grows with each effect beside all others.
@@ -313,33 +383,36 @@ impl Folds {
         white.iter().map(|x| x * x).sum()
     }
 
-    /// Residuals of every row under the fit of geometry and these effects to the folds that the row is not in, m and rad. What the effects were
-    /// before anybody looked, no other stretch knows: that is found again in the one that was left out.
+    /// Residuals of every row under the fit of geometry and these effects to the folds that the row is not in, m and rad. What no other fold
+    /// knows, what effects were before anybody looked and a set-up of its own, is found again in the one that was left out.
     fn left_out(&self, search: &Search, takes: &dyn Fn(usize) -> bool) -> Vec<f64> {
         let used = |c: &usize| self.part[*c].effect().is_none_or(takes);
         let columns: Vec<usize> = (0..self.part.len()).filter(used).collect();
-        // Initial conditions come last.
-        let lasting = columns.iter().filter(|c| !matches!(self.part[**c], Part::InitialCondition(_))).count();
-        let states = columns.len() - lasting;
         let of_columns = |(gram, b): (&DMatrix<f64>, &DVector<f64>)| {
             (gram.select_rows(&columns).select_columns(&columns), b.select_rows(&columns))
         };
         let solved = |fold: usize| -> Option<DVector<f64>> {
             let width = columns.len();
-            let start = (DMatrix::identity(width, width), DVector::zeros(width));
-            let others = (0..FOLDS).filter(|other| *other != fold).map(|other| &self.grams[other]);
-            let (gram, b) = others
+            let start = (DMatrix::zeros(width, width), DVector::zeros(width));
+            let others = (0..self.grams.len()).filter(|other| *other != fold).map(|other| &self.grams[other]);
+            let (mut gram, b) = others
                 .map(|(gram, b)| of_columns((gram, b)))
                 .fold(start, |(g, b), own| (g + own.0, b + own.1));
+            let is_own = |c: &usize| {
+                matches!(self.part[columns[*c]], Part::InitialCondition(_)) || gram[(*c, *c)] == 0.0
+            };
+            let (own, lasting): (Vec<usize>, Vec<usize>) = (0..width).partition(is_own);
+            (0..width).for_each(|c| gram[(c, c)] += 1.0);
             let mut x = Cholesky::new(gram)?.solve(&b);
             let (gram, b) = of_columns((&self.grams[fold].0, &self.grams[fold].1));
-            let own = gram.view((lasting, lasting), (states, states)) + DMatrix::identity(states, states);
-            let toward =
-                b.rows(lasting, states) - gram.view((lasting, 0), (states, lasting)) * x.rows(0, lasting);
-            x.rows_mut(lasting, states).copy_from(&Cholesky::new(own)?.solve(&toward));
+            let rows = gram.select_rows(&own);
+            let toward = b.select_rows(&own) - rows.select_columns(&lasting) * x.select_rows(&lasting);
+            let square = rows.select_columns(&own) + DMatrix::identity(own.len(), own.len());
+            let found = Cholesky::new(square)?.solve(&toward);
+            own.iter().zip(found.iter()).for_each(|(c, value)| x[*c] = *value);
             Some(x)
         };
-        let solutions: Vec<Option<DVector<f64>>> = (0..FOLDS).map(solved).collect();
+        let solutions: Vec<Option<DVector<f64>>> = (0..self.grams.len()).map(solved).collect();
         let residual = &search.rows.linear.residual;
         (0..residual.len())
             .map(|row| match &solutions[self.owner[row]] {

@@ -12,6 +12,7 @@ use super::diagnosis::{Named, rms_of};
 use super::finding::HeldOutPair;
 use super::folds;
 use super::held_out::Model;
+use super::names::LikelyName;
 use super::score::Rows;
 use super::search::{ENTER, ModelTerm, Search, all_but};
 use super::shares::Shares;
@@ -38,6 +39,9 @@ pub struct UnnamedPart {
     pub held_out_rms: ByQuantity<Option<HeldOutPair>>,
     /// Whether the model has it.
     pub modelled: bool,
+    /// Names that come into question for what is at its place, the likeliest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<LikelyName>,
 }
 
 /// More parts are not looked for.
@@ -45,17 +49,20 @@ const MOST: usize = 8;
 /// So many hypotheses are held against stretches left out before it is said that nothing more is foretold.
 const TRIES: usize = 6;
 
-/// Whether stretches that were left out are foretold better with term `i` of these, by more than one standard error of that.
-fn is_foretold(search: &Search, all: &[ModelTerm], i: usize) -> bool {
-    folds::gain(search, all, i).is_some_and(|(gain, error)| gain > error)
+/// Whether stretches that were left out are foretold better with term `i` of these, and whole recordings where there are several, each by
+/// more than one standard error of that.
+pub(super) fn is_foretold(search: &Search, all: &[ModelTerm], i: usize) -> bool {
+    let is_more = |(gain, error): (f64, f64)| gain > error;
+    folds::gain(search, all, i).is_some_and(is_more)
+        && folds::gain_elsewhere(search, all, i).is_none_or(is_more)
 }
 
 /// Free functions as candidates, beside the families of a search: what is no name for all that is there may be one for a part of it.
 pub(super) struct Unnamed {
     library: Library,
-    candidates: Vec<Candidate>,
+    pub(super) candidates: Vec<Candidate>,
     /// The first of them that is a free function.
-    first: usize,
+    pub(super) first: usize,
     coarse: Coarse,
 }
 
@@ -67,6 +74,11 @@ impl Unnamed {
         candidates.extend(library.candidates(machine, facts).all);
         let coarse = Coarse::new(search.rows.linear, candidates.len());
         Unnamed { library, candidates, first, coarse }
+    }
+
+    /// The dyad of a term's place; `None` for the instrument.
+    pub fn place(&self, term: &ModelTerm) -> Option<usize> {
+        self.candidates[term.candidate].place.dyad()
     }
 
     /// The rows of a search, for these candidates.
@@ -99,7 +111,8 @@ impl Unnamed {
     pub fn parts(&self, search: &Search, in_model: &[ModelTerm]) -> (Vec<ModelTerm>, Option<ModelTerm>) {
         let (mut all, first) = (in_model.to_vec(), in_model.len());
         let mut told = None;
-        let mut open: Vec<usize> = (0..self.candidates.len()).filter(|c| !search.is_event(*c)).collect();
+        // No other recording has this one's clock.
+        let mut open: Vec<usize> = (0..self.candidates.len()).filter(|c| !search.goes_by_clock(*c)).collect();
         while all.len() - first < MOST {
             (search.progress)(&format!("modelling what has no name, part {}", all.len() - first + 1));
             let marginal = Arc::new(search.beside_names(&all));
@@ -128,11 +141,11 @@ impl Unnamed {
         (parts, told)
     }
 
-    /// The parts among `all`, from `first` on, as they are told and as they are put into the model.
+    /// All terms as parts are told, and as they are put into the model.
     pub fn told(
         &self,
         search: &Search,
-        (all, first): (&[ModelTerm], usize),
+        all: &[ModelTerm],
         shares: &Shares,
         (machine, library): (&Machine, &Library),
         modelled: bool,
@@ -156,10 +169,11 @@ impl Unnamed {
                 rms: ByQuantity::of(of),
                 held_out_rms: folds::pair(search, all, i),
                 modelled,
+                names: Vec::new(),
             };
             (part, named)
         };
-        (first..all.len()).map(one).collect()
+        (0..all.len()).map(one).collect()
     }
 }
 

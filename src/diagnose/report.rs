@@ -35,6 +35,9 @@ const TOLERATED: f64 = 0.2;
 /// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
 /// leaves fewer independent readings.
 const SURPRISE: f64 = 0.003;
+/// What is modelled without a name leaves no more than this part of the squares of left-out stretches. Where it foretells less, the law is
+/// another one, and where that does nothing, what was taken for it would do harm.
+const HALF: f64 = 0.5;
 /// Several names that make the mean square of stretches left out so many times that of geometry alone are a patchwork.
 const WORSE: f64 = 2.0;
 /// More events of one moment each in one session are no slips: something is loose, or the instrument jumps to and fro.
@@ -118,33 +121,77 @@ pub(super) fn report(
     let mut all: Vec<_> = told.into_iter().zip(placebos).collect();
     all.sort_by(|(a, _), (b, _)| b.1.delta_bic.total_cmp(&a.1.delta_bic));
     let (told, placebos): (Vec<_>, Vec<_>) = all.into_iter().unzip();
-    let mut unexplained = doubt.map(|doubt| unexplained(search, machine, noise, &doubt));
     let kept: Vec<ModelTerm> = told.iter().map(|(i, ..)| in_model[*i].clone()).collect();
     let companions = shared::companions(search, library, &kept);
-    let in_model = [kept.as_slice(), &companions].concat();
-    // What has no name is modelled all the same.
-    let unnamed = unexplained.as_ref().map(|_| Unnamed::beside(search, machine, facts));
+    let mut told: Vec<Told> = (told.into_iter().zip(placebos).zip(kept))
+        .map(|(((_, finding, named), placebo), term)| Told { term, finding, named, placebo })
+        .collect();
+    // What has no name as it is, is modelled all the same, and then asked for its name.
+    let unnamed = doubt.as_ref().map(|_| Unnamed::beside(search, machine, facts));
     let wide = unnamed.as_ref().map(|unnamed| unnamed.rows(search));
     let wide = unnamed.as_ref().zip(wide.as_ref()).map(|(unnamed, rows)| unnamed.search(search, rows));
     let search = wide.as_ref().unwrap_or(search);
-    let (mut parts, mut of_parts) = (Vec::new(), Vec::new());
-    if let Some((unnamed, unexplained)) = unnamed.as_ref().zip(unexplained.as_mut()) {
-        let (modelled, only_told) = unnamed.parts(search, &in_model);
-        let all = [in_model.as_slice(), &modelled, only_told.as_slice()].concat();
-        let described =
-            unnamed.told(search, (&all, in_model.len()), &shares, (machine, library), only_told.is_none());
-        let (told, named): (Vec<UnnamedPart>, Vec<Named>) = described.into_iter().unzip();
-        unexplained.take(told);
-        if only_told.is_none() {
-            (parts, of_parts) = (modelled, named);
+    let (mut parts, mut of_parts, mut unexplained) = (Vec::new(), Vec::new(), None);
+    let mut of_companions = None;
+    if let Some((unnamed, doubt)) = unnamed.as_ref().zip(doubt) {
+        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
+        let (modelled, only_told) = unnamed.parts(search, &known);
+        let naming = unnamed.named(search, &known, modelled.clone());
+        let found = naming.told.iter().map(|(term, _)| term).chain(&naming.parts);
+        let all: Vec<ModelTerm> = known.iter().chain(found).cloned().collect();
+        let is_modelled = !modelled.is_empty()
+            && folds::remaining(search, &all, known.len()).is_some_and(|part| part <= HALF);
+        let (naming, only_told) = match is_modelled {
+            true => (naming, Vec::new()),
+            false => (naming.withdrawn(), modelled.into_iter().chain(only_told).collect()),
+        };
+        for k in 0..naming.told.len() {
+            let others = [known.as_slice(), &naming.parts].concat();
+            told.extend(promoted(search, &others, &naming.told, k, &shares, (machine, library)));
+        }
+        told.sort_by(|a, b| b.finding.delta_bic.total_cmp(&a.finding.delta_bic));
+        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
+        let shown = [naming.parts.as_slice(), &only_told].concat();
+        let all = [known.as_slice(), &shown].concat();
+        // All together: what stands in the model was solved with all that stands there.
+        let mut described = unnamed.told(search, &all, &shares, (machine, library), is_modelled);
+        let of_shown = described.split_off(known.len());
+        let (told_terms, rest) = described.split_at(told.len());
+        told.iter_mut().zip(told_terms).for_each(|(told, (_, named))| told.named = named.clone());
+        of_companions = Some(rest.iter().map(|(_, named)| named.clone()).collect::<Vec<Named>>());
+        let names = |term: &ModelTerm| naming.likely_at(unnamed.place(term));
+        let rank = |term: &ModelTerm| naming.places.iter().position(|place| *place == unnamed.place(term));
+        let mut shown_parts = Vec::new();
+        for ((part, named), term) in of_shown.into_iter().zip(&shown) {
+            shown_parts.push((rank(term), UnnamedPart { names: names(term), ..part }));
+            if is_modelled {
+                of_parts.push(named);
+            }
+        }
+        if is_modelled {
+            parts = shown;
+        }
+        let found = search.beside_names(&known);
+        let doubt = match naming.told.is_empty() {
+            true => Some(doubt),
+            false => still(search, &found, doubt, !shown_parts.is_empty()),
+        };
+        let left = if naming.told.is_empty() { &search.base } else { &found };
+        unexplained = doubt.map(|doubt| unexplained_by(search, machine, noise, &doubt, left));
+        if let Some(unexplained) = &mut unexplained {
+            unexplained.take(shown_parts);
         }
     }
+    let kept: Vec<ModelTerm> = told.iter().map(|told| told.term.clone()).collect();
+    let placebos: Vec<Option<Placebo>> = told.iter_mut().map(|told| told.placebo.take()).collect();
     let left_over = residual_of(search, &[kept.as_slice(), &parts].concat());
-    let in_model = [in_model.as_slice(), &parts].concat();
+    let in_model = [kept.as_slice(), &companions, &parts].concat();
     let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
     let (findings, mut named): (Vec<Finding>, Vec<Named>) =
-        told.into_iter().map(|(_, finding, named)| (finding, named)).unzip();
-    named.extend(shared::named(search, (machine, library), &kept, &companions));
+        told.into_iter().map(|told| (told.finding, told.named)).unzip();
+    let of_companions =
+        of_companions.unwrap_or_else(|| shared::named(search, (machine, library), &kept, &companions));
+    named.extend(of_companions);
     named.extend(of_parts);
     let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
@@ -184,6 +231,42 @@ pub(super) fn report(
     traces::fill(search, &kept, &left_over, machine, &mut diagnosis);
     orders::join(search, &kept, &mut diagnosis);
     diagnosis
+}
+
+/// What is told by name.
+struct Told {
+    term: ModelTerm,
+    finding: Finding,
+    named: Named,
+    placebo: Option<Placebo>,
+}
+
+/// The finding of a part that got a name, beside the others that did. Its size is that of all that happens at its place; what the model
+/// leaves to a free function there departs from it.
+fn promoted(
+    search: &Search,
+    others: &[ModelTerm],
+    told: &[(ModelTerm, f64)],
+    k: usize,
+    shares: &Shares,
+    (machine, library): (&Machine, &Library),
+) -> Option<Told> {
+    let place = |term: &ModelTerm| search.candidates[term.candidate].place.dyad();
+    let (term, probability) = &told[k];
+    let named = told.iter().map(|(term, _)| term);
+    let others = others.iter().filter(|other| place(other) != place(term));
+    let all: Vec<ModelTerm> = named.chain(others).cloned().collect();
+    let model = Model::new(search, &all);
+    let (finding, named) = finding(search, &all, k, shares, (machine, library), &model)?;
+    let finding = Finding { probability: *probability, ..finding };
+    Some(Told { term: term.clone(), finding, named, placebo: None })
+}
+
+/// What is still without a name when names were found for a part of it.
+fn still(search: &Search, found: &Marginal, doubt: Doubt, has_parts: bool) -> Option<Doubt> {
+    let (left, all) = (search.leftover(found), search.leftover(&search.base));
+    let is_much = left.beyond > CHANCE && left.energy > TOLERATED * all.energy;
+    (is_much || has_parts).then_some(Doubt { energy: left.energy, ..doubt })
 }
 
 /// Structure without a name: where, if that is known, and its energy in units of the noise's variance.
@@ -331,9 +414,15 @@ fn finding(
     Some((finding, named))
 }
 
-/// What is said of structure without a name.
-fn unexplained(search: &Search, machine: &Machine, noise: &[Noise], doubt: &Doubt) -> Unexplained {
-    let left_by_geometry = search.base.apply(&search.rows.residual);
+/// What is said of structure without a name; `found`: the marginal beside what has one.
+fn unexplained_by(
+    search: &Search,
+    machine: &Machine,
+    noise: &[Noise],
+    doubt: &Doubt,
+    found: &Marginal,
+) -> Unexplained {
+    let left = found.apply(&search.rows.residual);
     let (place, with) = doubt.place.map_or_else(|| whereabouts(search, machine), |place| (place, doubt.with));
     let at = place.name(machine);
     let goes_with = with.map(|joint| Place::Joint(joint).name(machine));
@@ -344,7 +433,7 @@ fn unexplained(search: &Search, machine: &Machine, noise: &[Noise], doubt: &Doub
         Some(_) => format!("{:.2} um", 1e6 * rms_m),
         None => in_words(rms_m, None, Dimension::ANGLE, None),
     };
-    let (r#where, gathers) = unexplained::gathered(search, machine, left_by_geometry.as_slice());
+    let (r#where, gathers) = unexplained::gathered(search, machine, left.as_slice());
     let mut explanation =
         format!("structure of {size} is left that no named effect explains; it fits best at {at}");
     if let Some(other) = &goes_with {

@@ -186,7 +186,7 @@ impl Search<'_> {
     }
 
     /// Whether it changes with time, whatever the axes do.
-    fn goes_by_clock(&self, candidate: usize) -> bool {
+    pub fn goes_by_clock(&self, candidate: usize) -> bool {
         self.candidates[candidate].features.iter().any(Feature::needs_moment)
     }
 

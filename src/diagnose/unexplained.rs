@@ -30,10 +30,12 @@ pub struct Unexplained {
 }
 
 impl Unexplained {
-    /// With its parts, in any order. What a joint or frame foretells is not the instrument's: the largest part then says where it is.
-    pub(super) fn take(&mut self, mut parts: Vec<UnnamedPart>) {
+    /// With its parts, each with the rank of its place, in any order. What a joint or frame foretells is not the instrument's: the place of
+    /// which most is there then says where it is.
+    pub(super) fn take(&mut self, mut parts: Vec<(Option<usize>, UnnamedPart)>) {
         let size = |part: &UnnamedPart| part.rms.m.or(part.rms.rad).unwrap_or(0.0);
-        parts.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        parts.sort_by(|(of_a, a), (of_b, b)| of_a.cmp(of_b).then(size(b).total_cmp(&size(a))));
+        let parts: Vec<UnnamedPart> = parts.into_iter().map(|(_, part)| part).collect();
         if let Some(first) = parts.first().filter(|first| first.modelled && self.at == MEASUREMENT) {
             self.explanation = self.explanation.replacen(
                 &format!("it fits best at {MEASUREMENT}"),

@@ -308,8 +308,14 @@ fn part(part: &UnnamedPart) -> String {
         .into_iter()
         .map(|(pair, angle)| format!("{} -> {}", amount(pair.before, angle), amount(pair.after, angle)))
         .collect();
+    let names: Vec<String> =
+        part.names.iter().map(|name| format!("{} ({:.2})", name.effect, name.probability)).collect();
+    let names = match names.is_empty() {
+        true => String::new(),
+        false => format!("; of all names for what is there {} fits best", names.join(", then ")),
+    };
     format!(
-        "something at {} that follows the {}: {} RMS; stretches left out of the fit {}; {}",
+        "something at {} that follows the {}: {} RMS; stretches left out of the fit {}; {}{names}",
         part.at,
         part.depends_on.join(" and the "),
         sizes.join(", "),

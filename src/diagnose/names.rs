@@ -1,0 +1,217 @@
+//! Which family describes what was modelled as a part without a name, `docs/diagnosis-method.md` (82).
+//!
+//! Real shapes depart from those of textbooks, and several small things act at one place. So the families compete there with each other and
+//! with none, beside everything that was found elsewhere, while a free function of the place may depart from each by a part of its size
+//! that nobody knows.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use super::evidence::log_sum_exp;
+use super::marginal::Marginal;
+use super::parts::{Unnamed, is_foretold};
+use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
+
+/// Parts of its size by which the shape of what happens may depart from its family's; each is as likely beforehand.
+const DEPARTURES: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
+
+/// How often what is found at a place has no name.
+const NAMELESS: f64 = 0.2;
+/// So many hypotheses are compared.
+const COMPARED: usize = 12;
+/// What is told by name is likelier than not.
+const LIKELY: f64 = 0.5;
+/// Names that are less likely are not told beside a part.
+const LISTED: f64 = 0.05;
+
+/// A name beside a part that has none.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LikelyName {
+    /// Name of a family.
+    pub effect: String,
+    /// Its probability at the part's place, against all other names there and none.
+    pub probability: f64,
+}
+
+/// What was modelled, after families were asked for.
+pub(super) struct Naming {
+    /// Terms that have a name, and its probability.
+    pub told: Vec<(ModelTerm, f64)>,
+    /// What stays without.
+    pub parts: Vec<ModelTerm>,
+    /// Names that come into question, by the dyad of the place.
+    pub likely: Vec<(Option<usize>, Vec<LikelyName>)>,
+    /// The dyads of all places, the one of which most is there first.
+    pub places: Vec<Option<usize>>,
+}
+
+impl Naming {
+    /// With nothing modelled.
+    pub fn withdrawn(self) -> Self {
+        Naming { told: Vec::new(), parts: Vec::new(), ..self }
+    }
+
+    /// Names that come into question at a place.
+    pub fn likely_at(&self, place: Option<usize>) -> Vec<LikelyName> {
+        self.likely.iter().find(|(at, _)| *at == place).map(|(_, names)| names.clone()).unwrap_or_default()
+    }
+}
+
+/// A family that comes into question at a place.
+struct Name {
+    /// Its best hypothesis.
+    hypothesis: Hypothesis,
+    /// Probability of its name there, all forms of it together.
+    probability: f64,
+}
+
+/// The families at one place, the likeliest first.
+struct Names {
+    all: Vec<Name>,
+    /// The likeliest as a term beside everything that was found elsewhere.
+    best: ModelTerm,
+}
+
+impl Unnamed {
+    /// Gives their names to these parts, place by place, the largest first, where a name is likely and foretells what was left out; what a
+    /// part does beside it stays only if that foretells more. Beside something larger that has no name, a name may be for its shadow: the
+    /// first place without one ends it.
+    pub fn named(&self, search: &Search, in_model: &[ModelTerm], mut parts: Vec<ModelTerm>) -> Naming {
+        let places = self.places(search, in_model, &parts);
+        let (mut told, mut likely): (Vec<(ModelTerm, f64)>, Vec<_>) = (Vec::new(), Vec::new());
+        // Settled positions show no course: any family of where a joint stands comes near there.
+        let mut is_open = search.in_motion;
+        for here in &places {
+            (search.progress)("naming what was modelled");
+            let (own, elsewhere): (Vec<ModelTerm>, Vec<ModelTerm>) =
+                parts.iter().cloned().partition(|part| self.place(part) == *here);
+            let found = told.iter().map(|(term, _)| term.clone());
+            let mut all: Vec<ModelTerm> = in_model.iter().cloned().chain(found).collect();
+            all.extend(elsewhere.iter().cloned());
+            let Some(names) = self.names(search, &own, &all) else {
+                is_open = false;
+                continue;
+            };
+            let effect = |name: &Name| self.candidates[name.hypothesis.candidate].told_as.clone();
+            let listed = names.all.iter().take_while(|name| name.probability > LISTED);
+            let listed = listed.map(|n| LikelyName { effect: effect(n), probability: n.probability });
+            likely.push((*here, listed.collect()));
+            let probability = names.all[0].probability;
+            all.push(names.best.clone());
+            is_open &= probability > LIKELY && is_foretold(search, &all, all.len() - 1);
+            if !is_open {
+                continue;
+            }
+            parts = elsewhere;
+            for part in own.into_iter().filter(|part| part.candidate != names.best.candidate) {
+                all.push(part.clone());
+                match is_foretold(search, &all, all.len() - 1) {
+                    true => parts.push(part),
+                    false => drop(all.pop()),
+                }
+            }
+            told.push((names.best, probability));
+        }
+        Naming { told, parts, likely, places }
+    }
+
+    /// The places of these parts by how much of what is there goes with all parts of a place together, most first.
+    fn places(&self, search: &Search, in_model: &[ModelTerm], parts: &[ModelTerm]) -> Vec<Option<usize>> {
+        let mut places: Vec<Option<usize>> = Vec::new();
+        for part in parts {
+            if !places.contains(&self.place(part)) {
+                places.push(self.place(part));
+            }
+        }
+        let left_without = |place: &Option<usize>| {
+            let others = parts.iter().filter(|part| self.place(part) != *place);
+            let others: Vec<ModelTerm> = in_model.iter().chain(others).cloned().collect();
+            search.rows.residual.dot(&search.beside_names(&others).apply(&search.rows.residual))
+        };
+        let mut by_size: Vec<(f64, Option<usize>)> =
+            places.into_iter().map(|place| (left_without(&place), place)).collect();
+        by_size.sort_by(|a, b| b.0.total_cmp(&a.0));
+        by_size.into_iter().map(|(_, place)| place).collect()
+    }
+
+    /// Names for what is at the place of the first of `own`, all of which are there, beside the `others`. `search`: with free functions.
+    fn names(&self, search: &Search, own: &[ModelTerm], others: &[ModelTerm]) -> Option<Names> {
+        let place = self.place(own.first()?);
+        let here = |c: &usize| self.candidates[*c].place.dyad() == place && !search.goes_by_clock(*c);
+        let all: Vec<usize> = (0..self.candidates.len()).filter(here).collect();
+        let (families, free): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|c| *c < self.first);
+        // By how much chance is larger than the noise says counts against all of them alike.
+        let taken_in = [others, own].concat();
+        let overdispersion = search.leftover(&search.beside_names(&taken_in)).overdispersion.max(1.0);
+        let search = &Search { overdispersion, ..self.search(search, search.rows) };
+        let ground = Arc::new(search.beside_names(others));
+        let left = ground.apply(&search.rows.residual);
+        let (departure, energy, alone) = self.departure(search, own, &free, &ground)?;
+        let evidence = |columns: &DMatrix<f64>| ground.worth(columns, &left, overdispersion);
+        let often = |c: usize| search.priors[c].exp();
+        let of_all: f64 = families.iter().map(|c| often(*c)).sum();
+        let each = (1.0 - NAMELESS) / of_all / DEPARTURES.len() as f64;
+        let mut weighed: BTreeMap<&str, Vec<Hypothesis>> = BTreeMap::new();
+        for plain in search.compare(ground.clone(), Some(&families)).iter().take(COMPARED) {
+            let c = plain.candidate;
+            // It departs by a part of its own size: what does next to nothing explains nothing by departing from it.
+            let size = (2.0 * plain.score.gain.max(0.0) / energy).sqrt().min(1.0);
+            for part in DEPARTURES {
+                let columns = &departure * (part * size);
+                let beside = Arc::new(ground.with(&(&columns / overdispersion.sqrt())));
+                for hypothesis in search.compare(beside, Some(&[c])) {
+                    let prior = (each * often(c)).ln() - search.priors[c];
+                    let weight = evidence(&columns) + hypothesis.weight + prior;
+                    let of_name = weighed.entry(self.candidates[c].told_as.as_str()).or_default();
+                    of_name.push(Hypothesis { weight, ..hypothesis });
+                }
+            }
+        }
+        // Without a name, everything is departure, or one free function of the size that suits it.
+        let nothing = evidence(&departure).max(alone) + NAMELESS.ln();
+        let of_name = |hypotheses: &Vec<Hypothesis>| {
+            log_sum_exp(&hypotheses.iter().map(|h| h.weight).collect::<Vec<f64>>())
+        };
+        let weights: Vec<f64> = weighed.values().map(of_name).chain([nothing]).collect();
+        let total = log_sum_exp(&weights);
+        let best = |hypotheses: Vec<Hypothesis>| {
+            hypotheses.into_iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).expect("one at least")
+        };
+        let mut all: Vec<Name> = (weighed.into_values().zip(weights))
+            .map(|(own, weight)| Name { hypothesis: best(own), probability: (weight - total).exp() })
+            .collect();
+        all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let best = search.enter_bare(&all.first()?.hypothesis, &ground)?;
+        let state = search.state_of(&best);
+        Some(Names { all, best: ModelTerm { state, near: families, ..best } })
+    }
+
+    /// Whitened columns of a free function of the place that is, with standard normal coefficients, as large as what is there, the energy
+    /// of that, and the logarithm of the evidence of the best such function alone.
+    fn departure(
+        &self,
+        search: &Search,
+        own: &[ModelTerm],
+        free: &[usize],
+        ground: &Arc<Marginal>,
+    ) -> Option<(DMatrix<f64>, f64, f64)> {
+        let best = search.compare(ground.clone(), Some(free)).into_iter().next()?;
+        let alone = best.weight - search.priors[best.candidate];
+        let best = search.enter_bare(&best, ground)?;
+        let is_free = |term: &&ModelTerm| term.candidate >= self.first && term.candidate != best.candidate;
+        let functions: Vec<&ModelTerm> = own.iter().filter(is_free).chain([&best]).collect();
+        let parts: Vec<&DMatrix<f64>> = functions.iter().map(|term| &term.columns).collect();
+        let columns = side_by_side(&parts, search.rows.residual.len());
+        let (mut gram, toward) = search.normal(&columns, ground);
+        let spread = gram.trace();
+        let plain = gram.clone();
+        (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
+        let solution: DVector<f64> = gram.cholesky()?.solve(&toward);
+        let energy = solution.dot(&(plain * &solution));
+        (spread > 0.0 && energy > 0.0).then(|| (columns * (energy / spread).sqrt(), energy, alone))
+    }
+}
