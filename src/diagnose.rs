@@ -7,6 +7,7 @@
 mod along;
 mod approaches;
 mod blocks;
+mod cells;
 mod coarse;
 mod contained;
 mod course;
@@ -64,7 +65,7 @@ inner! {
     use traces::{Along, Curve, CurvePoint, Trace, Traces};
 }
 pub use approaches::{SaidBy, StandsStill};
-pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel};
+pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel, Thinned};
 pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};
 pub use names::LikelyName;
 pub use not_tried::NotTried;

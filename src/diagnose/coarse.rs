@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use super::cells::AllCells;
 use super::linear::Linear;
 use super::panel::{LEVELS, Panel, WIDTH};
 use crate::effects::Candidate;
@@ -12,6 +13,8 @@ pub(super) struct Coarse {
     levels: Vec<Level>,
     /// Features of each candidate over its grid, once they have been asked for, and the level that they are for.
     kept: Vec<OnceLock<Option<(usize, Features)>>>,
+    /// Samples put together where joints stand alike, whenever that was.
+    pub cells: AllCells,
 }
 
 /// Blocks of samples that stand for themselves.
@@ -71,6 +74,22 @@ impl Features {
         all.iter().all(|x| x.is_finite()).then_some(AtPoint { runs, columns, samples: self.samples })
     }
 
+    /// Of a candidate at samples that stand for others, over its grid, without memory; `None` where they are too many or do not follow all samples.
+    pub fn over(
+        candidate: &Candidate,
+        (all, chosen): (&[Samples], &[Samples]),
+        follows: impl Fn(&[f64]) -> bool,
+    ) -> Option<Self> {
+        let (features, samples) = (candidate.features.len(), chosen.iter().map(|s| s.len).sum());
+        if candidate.grid.len() * features * samples > MOST_KEPT || !is_smooth(candidate, all, follows) {
+            return None;
+        }
+        let mut kept =
+            Features { values: Vec::new(), points: Vec::new(), runs: Vec::new(), features, samples };
+        candidate.scan(chosen, |_, columns| kept.push(columns, |k| k));
+        Some(kept)
+    }
+
     /// Puts a point behind the others.
     fn push(&mut self, columns: &[Vec<f64>], picked: impl Fn(usize) -> usize) {
         self.points.push((self.values.len(), self.runs.len()));
@@ -121,6 +140,7 @@ impl Coarse {
         Coarse {
             levels: sizes.into_iter().map(|size| Level::new(linear, size)).collect(),
             kept: (0..candidates).map(|_| OnceLock::new()).collect(),
+            cells: AllCells::new(candidates),
         }
     }
 
@@ -191,47 +211,51 @@ impl Level {
 
     fn evaluate(&self, candidate: &Candidate, fine: &[Samples]) -> Option<Features> {
         let (features, samples) = (candidate.features.len(), self.first.len());
-        if candidate.grid.len() * features * samples > MOST_KEPT || !self.is_smooth(candidate, fine) {
+        // What remembers the way it came is followed over every sample.
+        if !candidate.features.iter().any(|f| f.remembers()) {
+            return Features::over(candidate, (fine, &self.samples), |column| self.follows(column));
+        }
+        if candidate.grid.len() * features * samples > MOST_KEPT
+            || !is_smooth(candidate, fine, |column| self.follows(column))
+        {
             return None;
         }
         let mut kept =
             Features { values: Vec::new(), points: Vec::new(), runs: Vec::new(), features, samples };
-        // What remembers the way it came is followed over every sample.
-        if !candidate.features.iter().any(|f| f.remembers()) {
-            candidate.scan(&self.samples, |_, columns| kept.push(columns, |k| k));
-            return Some(kept);
-        }
         let mut middles = self.middle.clone();
         middles.dedup();
         candidate.scan(fine, |_, columns| kept.push(columns, |k| middles[k]));
         Some(kept)
     }
 
-    /// Whether the features change little within a block, at both ends of the grid; what jumps, in its middle.
-    fn is_smooth(&self, candidate: &Candidate, fine: &[Samples]) -> bool {
-        let grid = &candidate.grid;
-        let points = match candidate.jumps() {
-            true => [grid.get(grid.len() / 2), None],
-            false => [grid.first(), grid.last()],
-        };
-        points
-            .into_iter()
-            .flatten()
-            .all(|point| candidate.features.iter().all(|feature| self.follows(&feature.over(fine, point))))
-    }
-
     /// Whether a column changes little within a block.
     pub fn follows(&self, column: &[f64]) -> bool {
-        let (mut off, mut all) = (0.0, 0.0);
-        for (x, middle) in column.iter().zip(&self.middle) {
-            off += (x - column[*middle]).powi(2);
-            all += x * x;
-        }
-        off <= ROUGH * ROUGH * all
+        is_near(column, self.middle.iter().map(|middle| column[*middle]))
     }
 
     /// A column in the middles of the blocks.
     pub fn in_middles(&self, column: &[f64]) -> Vec<f64> {
         self.middle.chunk_by(|a, b| a == b).map(|block| column[block[0]]).collect()
     }
+}
+
+/// Whether the features of a candidate follow all samples, at both ends of the grid; what jumps, in its middle.
+fn is_smooth(candidate: &Candidate, all: &[Samples], follows: impl Fn(&[f64]) -> bool) -> bool {
+    let grid = &candidate.grid;
+    let points = match candidate.jumps() {
+        true => [grid.get(grid.len() / 2), None],
+        false => [grid.first(), grid.last()],
+    };
+    (points.into_iter().flatten())
+        .all(|point| candidate.features.iter().all(|feature| follows(&feature.over(all, point))))
+}
+
+/// Whether a column is near what stands for it.
+pub(super) fn is_near(column: &[f64], stands: impl Iterator<Item = f64>) -> bool {
+    let (mut off, mut all) = (0.0, 0.0);
+    for (x, stands) in column.iter().zip(stands) {
+        off += (x - stands).powi(2);
+        all += x * x;
+    }
+    off <= ROUGH * ROUGH * all
 }

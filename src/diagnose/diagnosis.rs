@@ -27,8 +27,11 @@ pub struct Diagnosis {
     pub machine: String,
     /// File names.
     pub recordings: Vec<String>,
-    /// Samples judged.
+    /// Samples of the recordings.
     pub samples: u64,
+    /// Which of them causes were looked for in, and everything here is told of, where that was not all of them. The model is fitted to all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thinned: Option<Thinned>,
     /// Standard deviation of the noise.
     #[serde(flatten, with = "noise_floor")]
     pub noise_floor: ByQuantity<Option<f64>>,
@@ -81,6 +84,16 @@ pub struct Diagnosis {
     /// The geometry as ISO 230-1 location errors.
     #[serde(skip)]
     pub location_errors: LocationErrors,
+}
+
+/// Every so manieth sample of large recordings.
+#[non_exhaustive]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Thinned {
+    /// Every so manieth.
+    pub every: u64,
+    /// How many these are.
+    pub samples: u64,
 }
 
 impl Diagnosis {

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::discrepancy;
 use super::evidence::likely_part;
-use super::marginal::Marginal;
+use super::marginal::{Marginal, with_prior};
 use super::refine::refine;
 use super::score::Score;
 use super::search::{Hypothesis, ModelTerm, Search};
@@ -127,7 +127,6 @@ impl Search<'_> {
 }
 
 /// Coefficients from normal equations, with their prior.
-pub(super) fn solved(mut gram: DMatrix<f64>, toward: &DVector<f64>) -> Option<DVector<f64>> {
-    (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
-    Some(gram.cholesky()?.solve(toward))
+pub(super) fn solved(gram: DMatrix<f64>, toward: &DVector<f64>) -> Option<DVector<f64>> {
+    Some(with_prior(gram)?.solve(toward))
 }

@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
 use super::finding::HeldOutPair;
-use super::marginal::gram;
+use super::marginal::{gram, with_prior};
 use super::search::{ModelTerm, Search, all_but};
 use crate::feature::Samples;
 use crate::units::{ByQuantity, Quantity};
@@ -395,20 +395,18 @@ impl Folds {
             let width = columns.len();
             let start = (DMatrix::zeros(width, width), DVector::zeros(width));
             let others = (0..self.grams.len()).filter(|other| *other != fold).map(|other| &self.grams[other]);
-            let (mut gram, b) = others
+            let (gram, b) = others
                 .map(|(gram, b)| of_columns((gram, b)))
                 .fold(start, |(g, b), own| (g + own.0, b + own.1));
             let is_own = |c: &usize| {
                 matches!(self.part[columns[*c]], Part::InitialCondition(_)) || gram[(*c, *c)] == 0.0
             };
             let (own, lasting): (Vec<usize>, Vec<usize>) = (0..width).partition(is_own);
-            (0..width).for_each(|c| gram[(c, c)] += 1.0);
-            let mut x = Cholesky::new(gram)?.solve(&b);
+            let mut x = with_prior(gram)?.solve(&b);
             let (gram, b) = of_columns((&self.grams[fold].0, &self.grams[fold].1));
             let rows = gram.select_rows(&own);
             let toward = b.select_rows(&own) - rows.select_columns(&lasting) * x.select_rows(&lasting);
-            let square = rows.select_columns(&own) + DMatrix::identity(own.len(), own.len());
-            let found = Cholesky::new(square)?.solve(&toward);
+            let found = with_prior(rows.select_columns(&own))?.solve(&toward);
             own.iter().zip(found.iter()).for_each(|(c, value)| x[*c] = *value);
             Some(x)
         };

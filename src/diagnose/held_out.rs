@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::marginal::gram;
+use super::marginal::{gram, with_prior};
 use super::search::{ModelTerm, Search};
 use crate::effects::{Candidate, Identified, Library};
 
@@ -60,10 +60,11 @@ impl Model {
                 columns.columns_mut(at, own.ncols()).copy_from(own);
             }
         }
-        let gram = gram(&columns, &columns) + DMatrix::identity(columns.ncols(), columns.ncols());
-        let identity = || DMatrix::identity(gram.nrows(), gram.nrows());
-        let solution =
-            gram.clone().try_inverse().unwrap_or_else(identity) * columns.tr_mul(&search.rows.residual);
+        let toward = columns.tr_mul(&search.rows.residual);
+        let solution = match with_prior(gram(&columns, &columns)) {
+            Some(factor) => factor.solve(&toward),
+            None => toward,
+        };
         Model { columns, offsets, solution }
     }
 
@@ -162,8 +163,8 @@ impl Model {
             wide = wide.insert_columns(at, effect.shape.ncols(), 0.0);
             wide.columns_mut(at, effect.shape.ncols()).copy_from(&(&effect.shape * shape));
         }
-        let gram = gram(&wide, &wide) + DMatrix::identity(wide.ncols(), wide.ncols());
-        let Some(inverse) = gram.try_inverse() else { return Solved { coefficients, covariance } };
+        let Some(factor) = with_prior(gram(&wide, &wide)) else { return Solved { coefficients, covariance } };
+        let inverse = factor.inverse();
         let place = |x: usize| -> (usize, f64) {
             if x < k { (own(x), scale(x)) } else { (at + x - k, slopes[x - k].2) }
         };

@@ -15,8 +15,10 @@ use crate::recording::{Chunk, Recording, step_of};
 use crate::units::Quantity;
 use crate::variation::{CONSTANT, Term};
 
-/// More samples than these in all are thinned out evenly.
-const MOST_SAMPLES: u64 = 40_000;
+/// More rows than these in all are thinned out evenly: along a path, where neighbours are put together, and among settled positions, each of
+/// which has to be looked at by itself.
+const MOST_ROWS: u64 = 40_000;
+const MOST_SETTLED: u64 = 6_000;
 
 /// Readings of one recording among the rows.
 #[derive(Clone, Debug)]
@@ -61,6 +63,9 @@ pub(super) struct Linear {
     pub constant: DMatrix<f64>,
     /// What features see, one stretch a recording.
     pub samples: Vec<Samples>,
+    /// Every so manieth sample of the recordings was taken, of so many.
+    pub every: u64,
+    pub all_samples: u64,
     /// What is known of each constant column beforehand.
     tolerated: Vec<(Option<f64>, f64)>,
     /// Where the machine is linearised.
@@ -92,11 +97,14 @@ pub(super) fn linear(
     recordings: &[Recording],
     options: CalibrateOptions,
     dead_bands: &[f64],
+    in_motion: bool,
     progress: &dyn Fn(&str),
 ) -> Result<Linear> {
     let found = optimum(machine, recordings, options, progress)?;
     progress("taking rows");
-    rows(machine, &found.sources, found.unknowns, found.fit, dead_bands, &[])
+    let most = if in_motion { MOST_ROWS } else { MOST_SETTLED };
+    let every = found.sources.readings().div_ceil(most).max(1);
+    rows(machine, &found.sources, (found.unknowns, found.fit), dead_bands, &[], every)
 }
 
 impl Linear {
@@ -135,7 +143,8 @@ impl Linear {
         let mut unknowns = self.unknowns.stepped(&layout, &step);
         unknowns.varying.terms.clone_from(&to.terms);
         unknowns.coefficients.clone_from(&to.coefficients);
-        let mut displaced = rows(machine, &sources, unknowns, self.fit.clone(), dead_bands, &to.features)?;
+        let mut displaced =
+            rows(machine, &sources, (unknowns, self.fit.clone()), dead_bands, &to.features, self.every)?;
         displaced.unknowns.varying = CONSTANT.clone();
         displaced.unknowns.coefficients.clear();
         Ok(displaced)
@@ -189,18 +198,17 @@ impl Columns {
     }
 }
 
-/// `features`: of all parts of the terms of `unknowns`, by sample.
+/// `features`: of all parts of the terms of `unknowns`, by sample; of the samples, every so manieth is taken.
 fn rows(
     machine: &Machine,
     sources: &Sources,
-    unknowns: Unknowns,
-    fit: Fit,
+    (unknowns, fit): (Unknowns, Fit),
     bands: &[f64],
     features: &[Vec<f64>],
+    every: u64,
 ) -> Result<Linear> {
     let (dyads, columns) = (machine.dyads().len(), Columns::new(machine, sources));
-    let stride = sources.samples().div_ceil(MOST_SAMPLES).max(1);
-    let kept = |source: &Source| source.summary.samples.div_ceil(stride) as usize;
+    let kept = |source: &Source| source.summary.samples.div_ceil(every) as usize;
     let count: usize = sources.all.iter().map(|s| kept(s) * s.sensor.reading_count()).sum();
     let mut linear = Linear {
         fit,
@@ -215,6 +223,8 @@ fn rows(
         carried: DMatrix::zeros(count, 6 * dyads),
         constant: DMatrix::zeros(count, columns.count()),
         samples: Vec::new(),
+        every,
+        all_samples: sources.samples(),
         tolerated: vec![(None, 0.0); columns.count()],
         unknowns,
     };
@@ -259,7 +269,7 @@ fn rows(
             }
             for k in 0..chunk.len {
                 number += 1;
-                if !(number - 1).is_multiple_of(stride) {
+                if !(number - 1).is_multiple_of(every) {
                     continue;
                 }
                 kept.push(k);

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, SVD};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn, SVD};
 
 use super::panel::{Panel, WIDTH, add_along, take_away};
 
@@ -51,15 +51,18 @@ impl Marginal {
         Marginal { panels: self.panels.iter().map(|panel| panel.reduced(level, &reduce)).collect() }
     }
 
+    /// `W` times an answer, summed over cells of rows: its panels with a row for each cell.
+    pub fn gathered(&self, answer: &[f64], cell: &[usize], cells: usize) -> Vec<Arc<Panel>> {
+        self.panels.iter().map(|panel| Arc::new(panel.gathered(answer, cell, cells))).collect()
+    }
+
     /// With further columns, each times its prior standard deviation: `M - M C (I + CᵀM C)⁻¹ CᵀM`.
     pub fn with(&self, columns: &DMatrix<f64>) -> Self {
         if columns.ncols() == 0 {
             return self.clone();
         }
         let beside = self.beside(columns);
-        let mut inner = gram(columns, &beside);
-        (0..inner.nrows()).for_each(|i| inner[(i, i)] += 1.0);
-        let Some(factor) = Cholesky::new(inner) else { return self.clone() };
+        let Some(factor) = with_prior(gram(columns, &beside)) else { return self.clone() };
         // W = M C L⁻ᵀ, so that Wᵀ = L⁻¹ (M C)ᵀ.
         let mut back = DMatrix::identity(columns.ncols(), columns.ncols());
         factor.l_dirty().solve_lower_triangular_mut(&mut back);
@@ -68,9 +71,9 @@ impl Marginal {
 
     /// Logarithm of the evidence of further columns, each times its prior standard deviation, with what is left of `y` beside the marginal.
     pub fn worth(&self, columns: &DMatrix<f64>, left: &DVector<f64>, overdispersion: f64) -> f64 {
-        let mut inner = gram(columns, &self.beside(columns)) / overdispersion;
-        (0..inner.nrows()).for_each(|i| inner[(i, i)] += 1.0);
-        let Some(factor) = Cholesky::new(inner) else { return 0.0 };
+        let Some(factor) = with_prior(gram(columns, &self.beside(columns)) / overdispersion) else {
+            return 0.0;
+        };
         let toward = columns.tr_mul(left) / overdispersion;
         0.5 * toward.dot(&factor.solve(&toward))
             - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
@@ -110,6 +113,15 @@ impl Marginal {
         self.add_along(0, c, &mut along);
         along
     }
+}
+
+/// What rounding makes of the square of a column, as part of it.
+const ROUNDING: f64 = 1e-12;
+
+/// Normal equations of columns whose coefficients are expected to be 1 at most, factored; what rounding hides is held back by as much more.
+pub(super) fn with_prior(mut gram: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0 + ROUNDING * gram[(i, i)]);
+    Cholesky::new(gram)
 }
 
 /// `aᵀ b` of tall matrices, by blocks that stay in a core's cache; nalgebra's `tr_mul` goes column by column.

@@ -7,9 +7,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use super::enter::solved;
 use super::evidence::log_sum_exp;
 use super::marginal::Marginal;
 use super::parts::{Unnamed, is_foretold};
@@ -83,9 +84,9 @@ impl Unnamed {
     pub fn named(&self, search: &Search, in_model: &[ModelTerm], mut parts: Vec<ModelTerm>) -> Naming {
         let places = self.places(search, in_model, &parts);
         let (mut told, mut likely): (Vec<(ModelTerm, f64)>, Vec<_>) = (Vec::new(), Vec::new());
+        let mut is_open = true;
         // Settled positions show no course: any family of where a joint stands comes near there.
-        let mut is_open = search.in_motion;
-        for here in &places {
+        for here in places.iter().filter(|_| search.in_motion) {
             (search.progress)("naming what was modelled");
             let (own, elsewhere): (Vec<ModelTerm>, Vec<ModelTerm>) =
                 parts.iter().cloned().partition(|part| self.place(part) == *here);
@@ -206,12 +207,10 @@ impl Unnamed {
         let functions: Vec<&ModelTerm> = own.iter().filter(is_free).chain([&best]).collect();
         let parts: Vec<&DMatrix<f64>> = functions.iter().map(|term| &term.columns).collect();
         let columns = side_by_side(&parts, search.rows.residual.len());
-        let (mut gram, toward) = search.normal(&columns, ground);
+        let (gram, toward) = search.normal(&columns, ground);
         let spread = gram.trace();
-        let plain = gram.clone();
-        (0..gram.nrows()).for_each(|i| gram[(i, i)] += 1.0);
-        let solution: DVector<f64> = gram.cholesky()?.solve(&toward);
-        let energy = solution.dot(&(plain * &solution));
+        let solution = solved(gram.clone(), &toward)?;
+        let energy = solution.dot(&(gram * &solution));
         (spread > 0.0 && energy > 0.0).then(|| (columns * (energy / spread).sqrt(), energy, alone))
     }
 }

@@ -48,6 +48,15 @@ impl Panel {
         self.reduced[level].get_or_init(|| Arc::new(reduce(self))).clone()
     }
 
+    /// Each row times a number, summed over cells of rows.
+    pub fn gathered(&self, by: &[f64], cell: &[usize], cells: usize) -> Panel {
+        let mut sums = vec![[0.0; WIDTH]; cells];
+        for ((row, x), cell) in self.rows.iter().zip(by).zip(cell) {
+            sums[*cell].iter_mut().zip(row).for_each(|(sum, w)| *sum += x * w);
+        }
+        Panel::new(sums)
+    }
+
     pub fn norm_squared(&self) -> f64 {
         self.rows.as_flattened().iter().map(|x| x * x).sum()
     }

@@ -45,7 +45,7 @@ pub struct UnnamedPart {
 }
 
 /// More parts are not looked for.
-const MOST: usize = 8;
+const MOST: usize = 16;
 /// So many hypotheses are held against stretches left out before it is said that nothing more is foretold.
 const TRIES: usize = 6;
 

@@ -3,7 +3,7 @@
 use super::along::along_travel;
 use super::approaches::approaches;
 use super::contained::says_no_more;
-use super::diagnosis::{Diagnosis, Named, by_model, rms_of};
+use super::diagnosis::{Diagnosis, Named, Thinned, by_model, rms_of};
 use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
 use super::held_out::Model;
@@ -196,7 +196,9 @@ pub(super) fn report(
     let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
         recordings: linear.spans.iter().map(|s| s.label.clone()).collect(),
-        samples: linear.lines.len() as u64,
+        samples: linear.all_samples,
+        thinned: (linear.every > 1)
+            .then(|| Thinned { every: linear.every, samples: linear.lines.len() as u64 }),
         noise_floor: ByQuantity::of(|quantity| noise_of(search, noise, quantity == Quantity::Angle)),
         rms: ByQuantity::of(|quantity| {
             let left = rms_of(search, &left_over, quantity == Quantity::Angle);

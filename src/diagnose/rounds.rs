@@ -57,7 +57,8 @@ impl Case<'_> {
     pub fn told(&self, plain: &[Candidate]) -> Result<Told> {
         let Case { machine, recordings, library, facts, progress, .. } = *self;
         progress("fitting constant geometry");
-        let mut linear = linear(machine, recordings, self.options, &facts.dead_bands, progress)?;
+        let in_motion = facts_are_smooth(facts);
+        let mut linear = linear(machine, recordings, self.options, &facts.dead_bands, in_motion, progress)?;
         let mut candidates = plain.to_vec();
         let runs = noise::runs(&linear);
         let mut coarse = Coarse::new(&linear, candidates.len());

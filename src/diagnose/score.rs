@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
+use super::cells::CellSums;
 use super::coarse::{Coarse, Features};
 use super::evidence::{Worth, evidence, log_mean_exp, rarity, sizes_up_to};
 use super::linear::Linear;
@@ -28,6 +29,9 @@ pub(super) struct Rows<'a> {
     /// Phases of waves by candidate, and energies of a candidate's pairs of features times an answer.
     pub(super) waves: Mutex<HashMap<usize, Option<Arc<Vec<Wave>>>>>,
     pub(super) energies: Mutex<HashMap<(usize, usize, Key), Column>>,
+    /// Whitened answers, and products of two of them summed over cells.
+    white: Mutex<HashMap<Key, Column>>,
+    pub(super) cell_energies: Mutex<HashMap<(usize, Key, Key), Column>>,
 }
 
 /// What all candidates are judged against: the marginal, and the residuals beside it, fine and coarse.
@@ -37,6 +41,8 @@ pub(super) struct Field {
     pub left: DVector<f64>,
     /// Marginal and residuals on the blocks of each level, once they have been asked for.
     pub(super) coarse: Vec<OnceLock<(Marginal, DVector<f64>)>>,
+    /// Sums of answers over cells, once they have been asked for.
+    pub(super) cells: Mutex<HashMap<(usize, Key), Arc<CellSums>>>,
 }
 
 /// A column that several candidates share.
@@ -71,6 +77,11 @@ impl Equations {
             false => (columns.tr_mul(columns), along.tr_mul(along)),
         };
         Equations { whole: own.diagonal(), gram: own - taken, toward }
+    }
+
+    /// `own`: Gram matrix of the columns.
+    pub fn from_products(own: DMatrix<f64>, along: &DMatrix<f64>, toward: DVector<f64>) -> Self {
+        Equations { whole: own.diagonal(), gram: own - along.tr_mul(along), toward }
     }
 
     /// Whether the marginal leaves next to nothing of one of the first columns, so that what is put together in blocks does not tell it.
@@ -122,6 +133,8 @@ impl<'a> Rows<'a> {
             coarse_columns: Mutex::default(),
             waves: Mutex::default(),
             energies: Mutex::default(),
+            white: Mutex::default(),
+            cell_energies: Mutex::default(),
         }
     }
 
@@ -130,7 +143,7 @@ impl<'a> Rows<'a> {
         let marginal = marginal.into();
         let left = marginal.apply(&self.residual);
         let coarse = self.coarse.levels().iter().map(|_| OnceLock::new()).collect();
-        Field { marginal, left, coarse }
+        Field { marginal, left, coarse, cells: Mutex::default() }
     }
 
     /// Everything constant, marginalised.
@@ -168,6 +181,22 @@ impl<'a> Rows<'a> {
             map.insert(key, column.clone());
         }
         column
+    }
+
+    /// How the readings answer to a twist in a slot, whitened.
+    pub(super) fn white_answer(&self, slot: Slot, direction: Twist<f64>) -> Column {
+        let key = key(slot, direction);
+        if let Some(known) = self.white.lock().ok().and_then(|map| map.get(&key).cloned()) {
+            return known;
+        }
+        let plain = self.answer(slot, direction);
+        let mut white = vec![0.0; plain.len()];
+        self.whitener.apply(&plain, &mut white);
+        let white = Arc::new(white);
+        if let Ok(mut map) = self.white.lock() {
+            map.insert(key, white.clone());
+        }
+        white
     }
 
     /// Whitened columns of a candidate, one per coefficient, times the size usual on machines; `None` if a feature is not there.
@@ -292,19 +321,31 @@ impl<'a> Rows<'a> {
             summary.also = also.filter(|at| *at != summary.parameters).collect();
             return Some(summary);
         }
-        let kept = self.coarse.features(i, candidate, &self.linear.samples);
-        self.table(candidate, &candidate.grid, field, kept, overdispersion, &all, &mut table);
+        let remembers = self.whitener.remembers();
+        // Rows that remember belong to their neighbours in time.
+        let in_cells = self.coarse.cells.features(i, candidate, self.linear).filter(|_| !remembers);
+        let kept = match in_cells {
+            Some(kept) => {
+                self.cell_table(candidate, field, kept, overdispersion, &all, &mut table);
+                None
+            }
+            None => {
+                let kept = self.coarse.features(i, candidate, &self.linear.samples);
+                self.table(candidate, &candidate.grid, field, kept, overdispersion, &all, &mut table);
+                kept
+            }
+        };
         let mut rough = summary(&candidate.grid, &table, &all)?;
         let halves = candidate.grid.iter().filter(|at| candidate.is_half(at, &rough.parameters)).cloned();
         rough.also = halves.collect();
-        if kept.is_none() {
+        if kept.is_none() && in_cells.is_none() {
             return Some(rough);
         }
         let best =
             candidate.grid.iter().position(|at| *at == rough.parameters).and_then(|i| table[i].as_ref());
         let is_faint = best.is_some_and(|best| best.is_faint);
         let is_nothing = rough.at_best <= 0.0 && !candidate.jumps();
-        if !is_faint && (!self.whitener.remembers() || is_nothing) {
+        if !is_faint && (is_nothing || !remembers && in_cells.is_none()) {
             return Some(rough);
         }
         // White rows of noise that remembers are differences: what jumps is in a single one, and drowns in its block.
@@ -493,7 +534,11 @@ fn unit_size(coefficient: &Coefficient, features: &[Vec<f64>]) -> f64 {
 /// it does not vanish, of so many samples.
 pub(super) fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X], samples: usize, is_number: bool) -> f64 {
     let square = |x: &X| (*x).into() * (*x).into();
-    let rms = (feature.iter().map(square).sum::<f64>() / samples.max(1) as f64).sqrt();
+    unit_of(size, (feature.iter().map(square).sum::<f64>() / samples.max(1) as f64).sqrt(), is_number)
+}
+
+/// The same of a feature with this root mean square.
+pub(super) fn unit_of(size: f64, rms: f64, is_number: bool) -> f64 {
     if rms > if is_number { FAINT } else { ROUNDING } { size / rms } else { 0.0 }
 }
 

@@ -9,7 +9,7 @@ use crate::wording::count;
 /// Most parameters of a family.
 const MOST_PARAMETERS: usize = 4;
 /// Most features of a family.
-const MOST_FEATURES: usize = 40;
+const MOST_FEATURES: usize = 80;
 
 /// What is wrong with a family.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

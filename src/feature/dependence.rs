@@ -35,6 +35,23 @@ impl Feature {
         });
         all
     }
+
+    /// The joints on whose position it depends, and whether it matters from which side each came; `None` where it depends on anything else.
+    pub(crate) fn stands_on(&self) -> Option<Vec<(usize, bool)>> {
+        let (mut joints, mut is_more) = (Vec::new(), false);
+        each(&self.node, &mut |node| match node {
+            Node::Joint(j, Column::Position) => joints.push((*j, false)),
+            Node::Joint(j, Column::Direction) => joints.push((*j, true)),
+            Node::Joint(..) | Node::Late(..) | Node::Time(_) | Node::Order(..) | Node::Channel(..) => {
+                is_more = true
+            }
+            Node::Needing(..) | Node::Only(..) => is_more = true,
+            Node::Play { .. } | Node::TakeUp { .. } | Node::Lag { .. } => is_more = true,
+            Node::Number(_) | Node::Parameter(_) | Node::Sum(_) | Node::Product(_) | Node::Quotient(_) => {}
+            Node::Power(..) | Node::Function(..) | Node::Chebyshev(..) | Node::Between(..) => {}
+        });
+        (!is_more).then_some(joints)
+    }
 }
 
 fn of_column(column: Column) -> &'static str {

@@ -1,6 +1,6 @@
 //! Normal equations, accumulated sample by sample in fixed memory, `docs/model.md` (20).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, Matrix6};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
@@ -214,9 +214,10 @@ fn part(
     let mut total = 0.0;
     let mut tally = Tally { samples: chunk.len as u64, ..Tally::default() };
     let quantities: Vec<Quantity> = (0..count).map(|i| source.quantity(evaluator.machine, i)).collect();
-    let mut piece = |members: &[usize]| {
-        let mut rows = DMatrix::<f64>::zeros(width, members.len() * count);
-        let mut whitened = DVector::<f64>::zeros(members.len() * count);
+    let most = (BLOCK / (width * count)).max(1);
+    let mut rows = DMatrix::<f64>::zeros(width, most * count);
+    let mut whitened = DVector::<f64>::zeros(most * count);
+    let mut block = |members: &[usize], piece: &mut Piece| {
         for (slot, k) in members.iter().enumerate() {
             let q = stretch.q(*k);
             let measured = &chunk.values[k * values..(k + 1) * values];
@@ -247,26 +248,47 @@ fn part(
                 }
             }
         }
-        Piece { matrix: &rows * rows.transpose(), gradient: &rows * whitened }
+        let rows = rows.columns(0, members.len() * count);
+        add_square(&rows, &mut piece.matrix);
+        piece.gradient.gemv(1.0, &rows, &whitened.rows(0, members.len() * count), 1.0);
+    };
+    let mut piece = |members: &[usize]| {
+        let mut piece = Piece { matrix: DMatrix::zeros(width, width), gradient: DVector::zeros(width) };
+        members.chunks(most).for_each(|members| block(members, &mut piece));
+        piece.matrix.fill_upper_triangle_with_lower_triangle();
+        piece
     };
     let pieces = members.iter().map(|members| (!members.is_empty()).then(|| piece(members))).collect();
     Part { pieces, loss: total, tally }
 }
 
+/// Numbers of rows that are multiplied at a time: they stay in a core's cache.
+const BLOCK: usize = 1 << 16;
+/// So many rows of a square are computed at a time, up to the diagonal and a little beyond.
+const STRIP: usize = 64;
+
+/// Adds `R Rᵀ` on and below the diagonal.
+fn add_square(rows: &DMatrixView<f64>, to: &mut DMatrix<f64>) {
+    let transposed = rows.transpose();
+    for from in (0..rows.nrows()).step_by(STRIP) {
+        let (strip, to_diagonal) = (STRIP.min(rows.nrows() - from), (from + STRIP).min(rows.nrows()));
+        let mut part = to.view_mut((from, 0), (strip, to_diagonal));
+        part.gemm(1.0, &rows.rows(from, strip), &transposed.columns(0, to_diagonal), 1.0);
+    }
+}
+
 /// From increments behind `exp(dh)` to the deviations' own coordinates, `docs/model.md` (12).
 fn turn_into_coordinates(piece: &mut Piece, evaluator: &Evaluator, deviations: &[Twist<f64>]) {
-    let width = piece.gradient.len();
-    let mut turn = DMatrix::identity(width, width);
     for (j, dh) in deviations.iter().enumerate().filter(|(j, _)| !evaluator.is_turned(*j)) {
         let block = deviation_jacobian(*dh);
-        for (a, row) in block.iter().enumerate() {
-            for (b, x) in row.iter().enumerate() {
-                turn[(6 * j + a, 6 * j + b)] = *x;
-            }
-        }
+        let turn = Matrix6::from_fn(|a, b| block[a][b]);
+        let columns = piece.matrix.fixed_columns::<6>(6 * j) * turn;
+        piece.matrix.fixed_columns_mut::<6>(6 * j).copy_from(&columns);
+        let rows = turn.transpose() * piece.matrix.fixed_rows::<6>(6 * j);
+        piece.matrix.fixed_rows_mut::<6>(6 * j).copy_from(&rows);
+        let own = turn.transpose() * piece.gradient.fixed_rows::<6>(6 * j);
+        piece.gradient.fixed_rows_mut::<6>(6 * j).copy_from(&own);
     }
-    piece.matrix = turn.transpose() * &piece.matrix * &turn;
-    piece.gradient = turn.transpose() * &piece.gradient;
 }
 
 impl Normal {

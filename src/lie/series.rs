@@ -19,6 +19,17 @@ fn alternating<S: Scalar>(t2: S, coefficient: impl Fn(usize) -> f64) -> S {
     sum
 }
 
+/// `1 / n!` of all `n` that the series need.
+const INVERSE_FACTORIALS: [f64; 2 * TERMS + 4] = {
+    let mut all = [0.0; 2 * TERMS + 4];
+    let mut n = 0;
+    while n < all.len() {
+        all[n] = inverse_factorial(n);
+        n += 1;
+    }
+    all
+};
+
 /// `1 / n!`
 const fn inverse_factorial(n: usize) -> f64 {
     let (mut product, mut i) = (1.0, 2);
@@ -58,11 +69,11 @@ impl<S: Scalar> Coefficients<S> {
         let e = (t.scale(2.0) - sin.scale(3.0) + t * cos).scale(0.5) * r * r2 * r2;
         let choose = |series: S, closed: S| t2.select_below(SERIES_BELOW, series, closed);
         Coefficients {
-            a: choose(alternating(t2, |k| inverse_factorial(2 * k + 1)), sin * r),
-            b: choose(alternating(t2, |k| inverse_factorial(2 * k + 2)), b),
-            c: choose(alternating(t2, |k| inverse_factorial(2 * k + 3)), c),
-            d: choose(alternating(t2, |k| inverse_factorial(2 * k + 4)), d),
-            e: choose(alternating(t2, |k| (k + 1) as f64 * inverse_factorial(2 * k + 5)), e),
+            a: choose(alternating(t2, |k| INVERSE_FACTORIALS[2 * k + 1]), sin * r),
+            b: choose(alternating(t2, |k| INVERSE_FACTORIALS[2 * k + 2]), b),
+            c: choose(alternating(t2, |k| INVERSE_FACTORIALS[2 * k + 3]), c),
+            d: choose(alternating(t2, |k| INVERSE_FACTORIALS[2 * k + 4]), d),
+            e: choose(alternating(t2, |k| (k + 1) as f64 * INVERSE_FACTORIALS[2 * k + 5]), e),
         }
     }
 }

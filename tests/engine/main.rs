@@ -9,6 +9,7 @@ mod alignment;
 mod bad_recordings;
 mod blind;
 mod concealment;
+mod curves;
 mod directions;
 mod effects_compensated;
 mod error_motions;

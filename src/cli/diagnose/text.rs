@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::diagnose::{
     Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, SaidBy,
-    StandsStill, Unexplained, UnnamedPart, UnseenSideBranch, Where,
+    StandsStill, Thinned, Unexplained, UnnamedPart, UnseenSideBranch, Where,
 };
 use crate::effects::in_words;
 use crate::feature::Dimension;
@@ -122,9 +122,14 @@ fn head(diagnosis: &Diagnosis) -> String {
     text
 }
 
-/// Noise and root mean squares, a line each.
+/// What was looked at, noise and root mean squares, a line each.
 pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
     let mut lines = Vec::new();
+    if let Some(Thinned { every, samples }) = diagnosis.thinned {
+        lines.push(format!(
+            "so many samples are thinned out: causes were looked for in one of {every} ({samples}), the model is fitted to all"
+        ));
+    }
     for (noise, angle) in both(diagnosis.noise_floor.m, diagnosis.noise_floor.rad) {
         lines.push(format!("noise of the readings: {}", amount(noise, angle)));
     }
