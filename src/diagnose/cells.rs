@@ -39,11 +39,17 @@ pub(super) struct Cells {
     samples: Vec<Samples>,
 }
 
-/// Cells by the joints that they are of, and the features of each candidate on its cells over its grid, once they have been asked for.
+/// All cells, and the features of each candidate on its cells over its grid, once they have been asked for.
 pub(super) struct AllCells {
-    of_joints: Mutex<HashMap<(Joints, usize), Option<Arc<Cells>>>>,
-    kept: Vec<OnceLock<Option<(Arc<Cells>, Features)>>>,
+    of_joints: Mutex<Known>,
+    kept: Vec<OnceLock<Option<InCells>>>,
 }
+
+/// Cells by the joints that they are of, and how many strips there are along each.
+type Known = HashMap<(Joints, usize), Option<Arc<Cells>>>;
+
+/// Cells, and the features of a candidate on them.
+pub(super) type InCells = (Arc<Cells>, Features);
 
 /// What an answer of the machine makes of a marginal and of the residuals, cell by cell.
 pub(super) struct CellSums {
@@ -57,12 +63,7 @@ impl AllCells {
     }
 
     /// Features of candidate `i` over its grid, if they are functions of where one or two joints stand that change little within a cell.
-    pub fn features(
-        &self,
-        i: usize,
-        candidate: &Candidate,
-        linear: &Linear,
-    ) -> Option<&(Arc<Cells>, Features)> {
+    pub fn features(&self, i: usize, candidate: &Candidate, linear: &Linear) -> Option<&InCells> {
         let first = || {
             let columns = candidate.grid.len() * candidate.coefficients.len();
             if columns < COLUMNS * answers(candidate).len() {
@@ -194,7 +195,7 @@ impl Rows<'_> {
         &self,
         candidate: &Candidate,
         field: &Field,
-        (cells, kept): &(Arc<Cells>, Features),
+        (cells, kept): &InCells,
         overdispersion: f64,
         points: &[usize],
         table: &mut [Option<Best>],

@@ -198,7 +198,7 @@ pub(super) fn report(
         recordings: linear.spans.iter().map(|s| s.label.clone()).collect(),
         samples: linear.all_samples,
         thinned: (linear.every > 1)
-            .then(|| Thinned { every: linear.every, samples: linear.lines.len() as u64 }),
+            .then_some(Thinned { every: linear.every, samples: linear.lines.len() as u64 }),
         noise_floor: ByQuantity::of(|quantity| noise_of(search, noise, quantity == Quantity::Angle)),
         rms: ByQuantity::of(|quantity| {
             let left = rms_of(search, &left_over, quantity == Quantity::Angle);
