@@ -16,9 +16,10 @@ use crate::feature::{Feature, Samples};
 use crate::variation::Part;
 
 /// About so many cells along one joint, and along each of two; for what is finer along one joint, each sample is a cell, next to its
-/// neighbours there.
+/// neighbours there, or a few are.
 const CELLS: usize = 512;
 const SIDE: usize = 24;
+const FINEST: usize = 8192;
 /// So many columns are built at a time.
 const BATCH: usize = 64;
 /// Sums over cells are worth their price from so many columns for each answer of the machine on.
@@ -70,7 +71,8 @@ impl AllCells {
                 return None;
             }
             let joints = joints(&candidate.features)?;
-            let sizes = if joints.len() == 1 { &[CELLS, linear.lines.len()][..] } else { &[SIDE] };
+            let each = linear.lines.len().min(FINEST);
+            let sizes = if joints.len() == 1 { &[CELLS, each][..] } else { &[SIDE] };
             sizes.iter().find_map(|strips| {
                 let cells = self.cells(joints.clone(), *strips, linear)?;
                 let samples = (&linear.samples[..], &cells.samples[..]);
