@@ -78,6 +78,9 @@ impl Rows<'_> {
     pub(super) fn on_level<'f>(&self, field: &'f Field, number: usize) -> &'f (Marginal, DVector<f64>) {
         let level = &self.coarse.levels()[number];
         field.coarse[number].get_or_init(|| {
+            if level.is_all() {
+                return ((*field.marginal).clone(), field.left.clone());
+            }
             let marginal = field.marginal.reduced(number, |panel| level.reduce_panel(panel));
             (marginal, DVector::from_vec(level.reduce(field.left.as_slice())))
         })

@@ -201,6 +201,11 @@ impl Level {
         sums
     }
 
+    /// Whether every block is a single sample.
+    pub fn is_all(&self) -> bool {
+        self.weight.len() == self.row.len()
+    }
+
     pub fn reduce_panel(&self, panel: &Panel) -> Panel {
         let mut sums = vec![[0.0; WIDTH]; self.weight.len()];
         for (row, to) in panel.rows().iter().zip(&self.row) {
