@@ -323,7 +323,7 @@ impl<'a> Rows<'a> {
         }
         let remembers = self.whitener.remembers();
         // Rows that remember belong to their neighbours in time.
-        let in_cells = self.coarse.cells.features(i, candidate, self.linear).filter(|_| !remembers);
+        let in_cells = (!remembers).then(|| self.coarse.cells.features(i, candidate, self.linear)).flatten();
         let kept = match in_cells {
             Some(kept) => {
                 self.cell_table(candidate, field, kept, overdispersion, &all, &mut table);
