@@ -10,7 +10,9 @@ use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use super::coarse::{AtPoint, Features, is_near};
 use super::linear::Linear;
 use super::panel::{Panel, WIDTH, add_along};
-use super::score::{Best, Column, Equations, Field, Key, Rows, best, is_of_number, key, lengths, unit_of};
+use super::score::{
+    BATCH, Best, Column, Equations, Field, Key, Rows, best, is_of_number, key, lengths, unit_of,
+};
 use crate::effects::{Candidate, Coefficient};
 use crate::feature::{Feature, Samples};
 use crate::variation::Part;
@@ -20,9 +22,7 @@ use crate::variation::Part;
 const CELLS: usize = 512;
 const SIDE: usize = 24;
 const FINEST: usize = 8192;
-/// So many columns are built at a time.
-const BATCH: usize = 64;
-/// Sums over cells are worth their price from so many columns for each answer of the machine on.
+/// Sums over cells are worth their memory from so many columns for each answer of the machine on.
 const COLUMNS: usize = 4;
 
 /// Joints by index of their dyad, and whether it matters from which side they came.
@@ -31,7 +31,7 @@ type Joints = BTreeMap<usize, bool>;
 /// Samples by where some joints stand.
 pub(super) struct Cells {
     /// Cell of each sample.
-    pub cell: Vec<usize>,
+    cell: Vec<usize>,
     /// Samples of each cell.
     count: Vec<f64>,
     /// The sample that stands for each cell.
@@ -76,7 +76,7 @@ impl AllCells {
             sizes.iter().find_map(|strips| {
                 let cells = self.cells(joints.clone(), *strips, linear)?;
                 let samples = (&linear.samples[..], &cells.samples[..]);
-                let features = Features::over(candidate, samples, |column| cells.follows(column))?;
+                let features = Features::over(candidate, samples, None, |column| cells.follows(column))?;
                 Some((cells, features))
             })
         };
@@ -171,15 +171,7 @@ impl Cells {
         let middle = self.cell.iter().map(|cell| column[self.middle[*cell]]);
         is_near(column, middle)
     }
-}
 
-/// Features of one point times one answer: the coefficients that have it, and their features in units of each, over the cells where they act.
-struct Answered {
-    coefficients: Vec<usize>,
-    columns: DMatrix<f64>,
-}
-
-impl Cells {
     /// What a coefficient is scaled by: the usual size over the root mean square of its first feature over all samples.
     fn unit(&self, coefficient: &Coefficient, features: &AtPoint) -> f64 {
         let Some(part) = coefficient.parts.first() else { return 0.0 };
@@ -189,6 +181,12 @@ impl Cells {
         let rms = (square / self.count.iter().sum::<f64>()).sqrt();
         unit_of(coefficient.size, rms, is_of_number(coefficient))
     }
+}
+
+/// Features of one point times one answer: the coefficients that have it, and their features in units of each, over the cells where they act.
+struct Answered {
+    coefficients: Vec<usize>,
+    columns: DMatrix<f64>,
 }
 
 impl Rows<'_> {
@@ -218,7 +216,10 @@ impl Rows<'_> {
             .collect();
         // Points at which features act everywhere are multiplied together: what the marginal takes of several columns is had in one pass.
         let is_everywhere = |i: &usize| kept.at(*i).is_some_and(|f| f.runs.len() == 1 && f.part() == 1.0);
-        let together = if keys.len() == 1 { (BATCH / coefficients.len()).max(1) } else { 1 };
+        let together = match keys.len() {
+            1 => (BATCH / (coefficients.len() * cells.count.len()).max(1)).max(1),
+            _ => 1,
+        };
         let (everywhere, somewhere): (Vec<usize>, Vec<usize>) =
             points.iter().partition(|i| together > 1 && is_everywhere(i));
         for batch in everywhere.chunks(together).chain(somewhere.chunks(1)) {

@@ -74,19 +74,22 @@ impl Features {
         all.iter().all(|x| x.is_finite()).then_some(AtPoint { runs, columns, samples: self.samples })
     }
 
-    /// Of a candidate at samples that stand for others, over its grid, without memory; `None` where they are too many or do not follow all samples.
+    /// Of a candidate over its grid, at samples that stand for others, or of these those that are picked; `None` where there are too many numbers
+    /// or they do not follow all samples.
     pub fn over(
         candidate: &Candidate,
-        (all, chosen): (&[Samples], &[Samples]),
+        (all, seen): (&[Samples], &[Samples]),
+        picked: Option<&[usize]>,
         follows: impl Fn(&[f64]) -> bool,
     ) -> Option<Self> {
-        let (features, samples) = (candidate.features.len(), chosen.iter().map(|s| s.len).sum());
+        let features = candidate.features.len();
+        let samples = picked.map_or_else(|| seen.iter().map(|s| s.len).sum(), <[usize]>::len);
         if candidate.grid.len() * features * samples > MOST_KEPT || !is_smooth(candidate, all, follows) {
             return None;
         }
         let mut kept =
             Features { values: Vec::new(), points: Vec::new(), runs: Vec::new(), features, samples };
-        candidate.scan(chosen, |_, columns| kept.push(columns, |k| k));
+        candidate.scan(seen, |_, columns| kept.push(columns, |k| picked.map_or(k, |picked| picked[k])));
         Some(kept)
     }
 
@@ -215,22 +218,14 @@ impl Level {
     }
 
     fn evaluate(&self, candidate: &Candidate, fine: &[Samples]) -> Option<Features> {
-        let (features, samples) = (candidate.features.len(), self.first.len());
-        // What remembers the way it came is followed over every sample.
+        let follows = |column: &[f64]| self.follows(column);
         if !candidate.features.iter().any(|f| f.remembers()) {
-            return Features::over(candidate, (fine, &self.samples), |column| self.follows(column));
+            return Features::over(candidate, (fine, &self.samples), None, follows);
         }
-        if candidate.grid.len() * features * samples > MOST_KEPT
-            || !is_smooth(candidate, fine, |column| self.follows(column))
-        {
-            return None;
-        }
-        let mut kept =
-            Features { values: Vec::new(), points: Vec::new(), runs: Vec::new(), features, samples };
+        // What remembers the way it came is followed over every sample.
         let mut middles = self.middle.clone();
         middles.dedup();
-        candidate.scan(fine, |_, columns| kept.push(columns, |k| middles[k]));
-        Some(kept)
+        Features::over(candidate, (fine, fine), Some(&middles), follows)
     }
 
     /// Whether a column changes little within a block.

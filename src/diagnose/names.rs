@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::enter::solved;
 use super::evidence::log_sum_exp;
 use super::marginal::Marginal;
+use super::odds::LISTED;
 use super::parts::{Unnamed, is_foretold};
 use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
 
@@ -24,9 +25,7 @@ const NAMELESS: f64 = 0.2;
 /// So many hypotheses are compared.
 const COMPARED: usize = 12;
 /// What is told by name is likelier than not.
-const LIKELY: f64 = 0.5;
-/// Names that are less likely are not told beside a part.
-const LISTED: f64 = 0.05;
+pub(super) const LIKELY: f64 = 0.5;
 
 /// A name beside a part that has none.
 #[non_exhaustive]

@@ -6,7 +6,7 @@ use crate::effects::{Family, Place};
 use crate::machine::Machine;
 
 /// Names of which the data say less than this against the best are listed with it.
-const LISTED: f64 = 0.05;
+pub(super) const LISTED: f64 = 0.05;
 /// How often the true shape of an effect is none of its family's, and the part of its energy by which that may shift the odds of other
 /// names for the same place, and of its own name at other places.
 const UNSURE: f64 = 0.2;

@@ -8,6 +8,7 @@ use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
 use super::held_out::Model;
 use super::marginal::Marginal;
+use super::names::LIKELY;
 use super::noise::Noise;
 use super::odds::{Odds, confusable, odds, trust};
 use super::orders;
@@ -56,8 +57,6 @@ const PLAIN: f64 = 0.01;
 const ALIAS: f64 = 1.0 / 3.0;
 /// Logarithm of the odds at which a finding is told.
 const TOLD: f64 = 5.0;
-/// Along a path, what is no more likely than this is no name. Of settled positions, names are told only where they foretell others.
-const LIKELY: f64 = 0.5;
 /// A name whose cause may be exchanged for a meaningless one, with evidence greater by this logarithm, is none.
 const OUTDONE: f64 = 5.0;
 
@@ -103,6 +102,7 @@ pub(super) fn report(
         .filter(|((i, ..), placebo)| is_outdone(placebo) || says_no_more(search, in_model, *i))
         .map(|((i, ..), _)| place(i))
         .collect();
+    // Of settled positions, names are told only where they foretell others.
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
         !empty.contains(&place(i)) && (!search.in_motion || finding.probability > LIKELY)
     };

@@ -447,3 +447,19 @@ pub(crate) fn matrix_in_general(
     }
     normal.matrix
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_of_a_square_make_the_whole() {
+        for width in [1, STRIP, 2 * STRIP + 7] {
+            let rows = DMatrix::from_fn(width, 30, |i, j| (0.3 * (i as f64 + 1.0) * (j as f64 + 2.0)).sin());
+            let mut square = DMatrix::zeros(width, width);
+            add_square(&rows.as_view(), &mut square);
+            square.fill_upper_triangle_with_lower_triangle();
+            assert!((square - &rows * rows.transpose()).amax() < 1e-12);
+        }
+    }
+}
