@@ -7,6 +7,12 @@ use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{Branch, Drive, JointKind, Machine};
 use crate::scalar::Scalar;
 
+mod batch;
+mod path;
+
+pub use batch::Batch;
+pub(crate) use path::{Moved, Path};
+
 /// A machine with constant deviations, ready to be evaluated. Generic over the scalar: the production code and the autodiff
 /// check run the same functions.
 #[derive(Clone, Debug)]

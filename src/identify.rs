@@ -4,10 +4,13 @@
 //! file's tolerances, so that what the data do not see stays at zero instead of drifting. The result is data: [`Fit`].
 
 mod align;
+mod basis;
+mod blocks;
 mod evaluator;
 mod evidence;
 mod far_off;
 mod fit;
+mod gauge;
 mod information;
 mod judge;
 mod loss;
@@ -31,12 +34,13 @@ mod warnings;
 inner! {
     use information::Information;
 }
-pub(crate) use evaluator::{EXTRAS, Evaluator, Moment, Values};
+pub(crate) use evaluator::{Evaluator, Moment, Values};
 pub use far_off::FarOff;
 pub use fit::{
     BeforeAfter, COMPONENTS, CoefficientFit, Combination, Fit, HeldOut, ParameterFit, RecordingFit, SetupFit,
     Suspect,
 };
+pub(crate) use gauge::EXTRAS;
 pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
 pub(crate) use optimum::{optimum, sources};

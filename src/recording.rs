@@ -9,8 +9,8 @@
 //! ```
 //!
 //! [`Recording::open`] reads header and column names and settles what every column is for; no row is held. Every pass
-//! ([`Recording::chunks`], [`Recording::rows_with_text`], [`Recording::scan`]) reads the file anew, line by line, in memory that
-//! does not grow with the file. Units are converted at this border: everything that comes out is m, rad, s, K.
+//! ([`Recording::chunks`], [`Recording::rows_with_text`], [`Recording::scan`]) reads the file line by line, in memory that does not grow
+//! with the file; the samples of recordings that are not too large are kept by the first full pass for those after it. Units are converted at this border: everything that comes out is m, rad, s, K.
 //!
 //! A row is a *drop-out*, left out and counted, where a command, the time, a direction or a measured number is empty or NaN.
 //! A *pause* is a time between two samples longer than five times the median one; derivatives start again after it.
@@ -22,6 +22,7 @@ mod entry;
 mod fault;
 mod header;
 mod join;
+mod kept;
 mod lines;
 mod reader;
 mod step;
@@ -44,12 +45,13 @@ pub(crate) use step::step_of;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
 use column::Layout;
 use header::Draft;
+use kept::Kept;
 use lines::{LONGEST, Lines, Stop};
 use reader::Pass;
 use text::Fail;
@@ -94,6 +96,8 @@ pub struct Recording {
     preamble: String,
     /// Number of the header row and the byte behind it.
     data_from: (u64, u64),
+    /// What the first full pass has brought.
+    kept: Arc<OnceLock<Kept>>,
 }
 
 #[derive(Clone, Debug)]
@@ -150,7 +154,20 @@ impl Recording {
         let data_from = (lines.number, lines.offset);
         let Draft { header, fixed, warnings, .. } = draft;
         let machine = machine.clone();
-        Ok(Recording { path, name, source, machine, header, fixed, layout, warnings, preamble, data_from })
+        let kept = Arc::default();
+        Ok(Recording {
+            path,
+            name,
+            source,
+            machine,
+            header,
+            fixed,
+            layout,
+            warnings,
+            preamble,
+            data_from,
+            kept,
+        })
     }
 
     /// What the recording says of itself.
@@ -203,12 +220,27 @@ impl Recording {
         &self.warnings
     }
 
-    /// The samples in chunks of at most 4096, read anew from the file; after an error nothing more comes.
+    /// The samples in chunks of at most 4096, from memory where [`Recording::scan`] has kept them, else read anew from the file; after an
+    /// error nothing more comes.
     ///
     /// # Errors
     /// [`Error::File`] here; each chunk may bring [`Error::Input`] with line and column.
     pub fn chunks(&self) -> Result<Chunks<'_>> {
-        Ok(Pass::start(self)?.chunks())
+        match self.kept.get().and_then(Kept::chunks) {
+            Some(chunks) => Ok(Chunks::kept(chunks)),
+            None => Ok(Pass::start(self)?.chunks()),
+        }
+    }
+
+    /// As [`Recording::chunks`], without a copy of what is in memory.
+    ///
+    /// # Errors
+    /// As [`Recording::chunks`].
+    pub(crate) fn shared_chunks(&self) -> Result<Box<dyn Iterator<Item = Result<Arc<Chunk>>> + '_>> {
+        match self.kept.get().and_then(Kept::chunks) {
+            Some(chunks) => Ok(Box::new(chunks.iter().cloned().map(Ok))),
+            None => Ok(Box::new(Pass::start(self)?.chunks().map(|chunk| chunk.map(Arc::new)))),
+        }
     }
 
     /// The rows as written together with their samples, in blocks of at most 4096 rows; drop-outs are among the rows.
@@ -219,12 +251,17 @@ impl Recording {
         Ok(Pass::start(self)?.with_text())
     }
 
-    /// Reads all rows once: checks them, counts, takes ranges.
+    /// Reads all rows once: checks them, counts, takes ranges. Later passes over a recording that is not too large are over what this one
+    /// keeps in memory, as is a second scan.
     ///
     /// # Errors
     /// The first fault in a row; [`RecordingFault::NoRows`] or [`RecordingFault::AllDropped`] where no sample is left.
     pub fn scan(&self) -> Result<Summary> {
-        summary::scan(self)
+        if let Some(kept) = self.kept.get() {
+            return Ok(kept.summary.clone());
+        }
+        let kept = summary::scan(self)?;
+        Ok(self.kept.get_or_init(|| kept).summary.clone())
     }
 
     /// Lines behind the header row.

@@ -1,4 +1,4 @@
-//! The one small trait that lets the same kinematics run on `f64`, on dual numbers and, later, on SIMD lanes.
+//! The one small trait that lets the same kinematics run on `f64`, on dual numbers and on SIMD lanes.
 //!
 //! About a dozen operations, none of which branches: code that needs a case distinction says [`Scalar::select_below`].
 //! Constants are made from a value at hand with [`Scalar::lift`], because lanes need the token that a value carries.
@@ -9,8 +9,10 @@ use std::ops::{Add, Mul, Neg, Sub};
 use num_dual::{Dual64, DualNum, DualSVec64};
 
 mod elementary;
+mod lanes;
 
-pub(crate) use elementary::{exponentials, sines_cosines};
+pub(crate) use elementary::exponentials;
+pub(crate) use lanes::{Lanes, MOST_LANES, sines_cosines};
 
 /// A number that the kinematic kernels can work with: `f64`, [`Dual64`], [`DualSVec64`].
 ///
@@ -20,6 +22,12 @@ pub trait Scalar:
 {
     /// The constant `value`, of the same kind as `self`; a dual's derivative part is zero.
     fn lift(self, value: f64) -> Self;
+
+    /// `self * factor + addend`; rounded once where an instruction for that is at hand.
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
 
     /// Square root. The argument must be positive where a derivative is wanted.
     fn sqrt(self) -> Self;
@@ -77,7 +85,7 @@ impl Scalar for f64 {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        f64::sin_cos(self)
+        elementary::sine_cosine(self)
     }
     #[inline(always)]
     fn exp(self) -> Self {

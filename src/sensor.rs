@@ -113,30 +113,17 @@ impl Sensor {
         let p_w = w_from_t.transform(state.tool_point_t);
         let like = p_w.0[0];
         let t_from_w = w_from_t.rotation.transpose();
-        let along = |n_w: Vec3<S>, value: S| Reading {
-            value,
-            by_twist_w: Wrench::at_point(n_w, p_w),
-            by_tool_point_t: t_from_w * n_w,
-            by_tool_rotation: Vec3::zero(like),
+        let of_point = |i: usize| {
+            let (value, n_w) = self.of_point(i, p_w, state);
+            let (by_twist_w, by_tool_rotation) = (Wrench::at_point(n_w, p_w), Vec3::zero(like));
+            Reading { value, by_twist_w, by_tool_point_t: t_from_w * n_w, by_tool_rotation }
         };
-        let unit = |k: usize| Vec3(std::array::from_fn(|i| like.lift(if i == k { 1.0 } else { 0.0 })));
-        let mut readings = [along(unit(0), p_w.0[0]); MOST_READINGS];
+        let mut readings = [of_point(0); MOST_READINGS];
         match self {
-            Sensor::Distance { absolute } => {
-                // (16): the unit vector along the bar is the force of the wrench.
-                let bar = p_w - state.workpiece_point_w;
-                let distance = bar.norm();
-                let value = if *absolute { distance } else { distance - state.length };
-                readings[0] = along(bar.times(distance.recip()), value);
-            }
-            Sensor::Position => {
-                // (15)
-                readings[1] = along(unit(1), p_w.0[1]);
-                readings[2] = along(unit(2), p_w.0[2]);
-            }
+            Sensor::Distance { .. } | Sensor::Displacement { .. } => {}
+            Sensor::Position => (readings[1], readings[2]) = (of_point(1), of_point(2)),
             Sensor::Pose => {
-                readings[1] = along(unit(1), p_w.0[1]);
-                readings[2] = along(unit(2), p_w.0[2]);
+                (readings[1], readings[2]) = (of_point(1), of_point(2));
                 // (18): φ = log(R_measured R_modelᵀ); its change with a turn of the model is -J⁻¹(-φ).
                 let target_from_w = (w_from_t.rotation * state.tool_rotation_t).transpose();
                 let missing = crate::lie::Pose {
@@ -154,13 +141,38 @@ impl Sensor {
                     };
                 }
             }
-            Sensor::Displacement { direction_w } => {
-                // (17)
-                let n = direction_w.lift(like);
-                readings[0] = along(n, n.dot(p_w) + state.zero);
-            }
             Sensor::Joint { .. } => unreachable!("a joint's reading needs no sweep"),
         }
         (readings, self.reading_count())
+    }
+
+    /// Value of reading `i`, m, where the tool point is at `p_w`, and the unit vector of `w` along which it answers to that point: lengths,
+    /// and the position part of a pose.
+    #[inline(always)]
+    pub(crate) fn of_point<S: Scalar>(&self, i: usize, p_w: Vec3<S>, state: &SensorState<S>) -> (S, Vec3<S>) {
+        let like = p_w.0[0];
+        match self {
+            Sensor::Distance { absolute } => {
+                // (16): the unit vector along the bar is the force of the wrench.
+                let bar = p_w - state.workpiece_point_w;
+                let distance = bar.norm();
+                let value = if *absolute { distance } else { distance - state.length };
+                (value, bar.times(distance.recip()))
+            }
+            Sensor::Displacement { direction_w } => {
+                // (17)
+                let n = direction_w.lift(like);
+                (n.dot(p_w) + state.zero, n)
+            }
+            // (15)
+            _ => {
+                let (o, l, [x, y, z]) = (like.lift(0.0), like.lift(1.0), p_w.0);
+                match i {
+                    0 => (x, Vec3([l, o, o])),
+                    1 => (y, Vec3([o, l, o])),
+                    _ => (z, Vec3([o, o, l])),
+                }
+            }
+        }
     }
 }

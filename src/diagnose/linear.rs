@@ -248,7 +248,7 @@ fn rows(
             let of = |column: &Vec<f64>| column[first_sample..first_sample + kept(source)].to_vec();
             let features = features.iter().map(of).collect();
             let (chunk, motion) = (Chunk::default(), Motion::default());
-            Stretch { chunk, motion, features, commands: machine.commands().len() }
+            Stretch { chunk: chunk.into(), motion, features, commands: machine.commands().len() }
         });
         let options = FollowOptions {
             recording: source.recording.name().to_string(),

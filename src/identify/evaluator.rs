@@ -1,17 +1,16 @@
 //! Residuals and Jacobian rows of one sample.
 
+use super::blocks::Samples;
+use super::gauge::{EXTRAS, Gauge};
 use super::source::Source;
 use super::stretch::Stretch;
 use super::unknowns::Unknowns;
-use crate::chain::{Chain, Sweep, deviation_jacobian};
+use crate::chain::{Chain, Path, Sweep, deviation_jacobian};
 use crate::error_motion::ErrorMotions;
 use crate::lie::{Mat3, Pose, Twist, Wrench};
 use crate::machine::Machine;
 use crate::sensor::{MOST_READINGS, Sensor, SensorState};
 use crate::variation::{Directions, Slot, Term};
-
-/// Extra columns of a source behind the six of each dyad: tool point, zero, length, tool rotation.
-pub(crate) const EXTRAS: usize = 8;
 
 /// Deviations of one pattern of directions.
 pub(crate) struct Piece {
@@ -136,6 +135,38 @@ impl<'a> Evaluator<'a> {
         }
     }
 
+    /// The samples of a stretch by piece.
+    pub fn members(&self, stretch: &Stretch) -> Vec<Vec<usize>> {
+        if self.pieces.len() == 1 {
+            return vec![(0..stretch.chunk.len).collect()];
+        }
+        let mut members: Vec<Vec<usize>> = vec![Vec::new(); self.pieces.len()];
+        (0..stretch.chunk.len).for_each(|k| members[self.piece(Moment::At(stretch, k))].push(k));
+        members
+    }
+
+    /// The residuals of all samples of a stretch, those of a sample one after the other: as [`Evaluator::residuals`] gives them.
+    pub fn all_residuals(&self, stretch: &Stretch) -> Vec<f64> {
+        let count = self.sensor.reading_count();
+        let mut residuals = vec![0.0; stretch.chunk.len * count];
+        if let Some(gauges) = self.gauges() {
+            for (members, gauge) in self.members(stretch).iter().zip(&gauges) {
+                let own = Samples { gauge, stretch, members }.residuals();
+                for (k, own) in members.iter().zip(own.chunks_exact(count)) {
+                    residuals[k * count..(k + 1) * count].copy_from_slice(own);
+                }
+            }
+            return residuals;
+        }
+        let mut work = self.workspace();
+        for (k, own) in residuals.chunks_exact_mut(count).enumerate() {
+            let measured = &stretch.chunk.values[k * count..(k + 1) * count];
+            let all = self.residuals(stretch.q(k), measured, Moment::At(stretch, k), &mut work, None);
+            own.copy_from_slice(&all[..count]);
+        }
+        residuals
+    }
+
     /// How many pieces there are.
     pub fn piece_count(&self) -> usize {
         self.pieces.len()
@@ -154,6 +185,16 @@ impl<'a> Evaluator<'a> {
     /// Columns of a row: six of each dyad, the extras, one of each term.
     pub fn width(&self) -> usize {
         6 * self.machine.dyads().len() + EXTRAS + self.terms.len()
+    }
+
+    /// The same for many samples at a time, one for each piece; none where deviations change from sample to sample.
+    pub fn gauges(&self) -> Option<Vec<Gauge<'_>>> {
+        if self.changes() {
+            return None;
+        }
+        let dyads = self.machine.dyads().len();
+        let gauge = |piece: &Piece| Gauge::new(Path::new(&piece.chain), self.sensor, self.state, dyads);
+        self.pieces.iter().map(gauge).collect()
     }
 
     /// A workspace.

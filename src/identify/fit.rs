@@ -10,11 +10,13 @@ use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
 use super::plausible::{Plausibility, plausibility};
 use super::solve::Problem;
 use super::source::{Known, Which};
+use super::stretch::Stretch;
 use super::unknowns::{Block, Role, Unknowns};
 use super::warnings::warnings;
 use super::{CalibrateOptions, Found, Information, Loss, Solver, Stop};
 
 use crate::error::Result;
+use crate::error_motion::Motions;
 use crate::lie::Vec3;
 use crate::location::{LocationErrors, location_errors};
 use crate::residual::Sizes;
@@ -471,32 +473,22 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
     let (mut outliers, mut all) = (0, Vec::new());
     sources.pass(
         |index, stretch| {
-            let chunk = &stretch.chunk;
             let (source, evaluator) = (&sources.all[index], &evaluators[index]);
             let sigmas = sigmas(source, machine, found.noise[index]);
-            let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
-            let mut work = evaluator.workspace();
-            let own_width = evaluator.width();
-            let mut rows = vec![0.0; if motions.len() > 0 { count * own_width } else { 0 }];
-            let mut columns = vec![0.0; motions.len()];
+            let count = source.sensor.reading_count();
             let (mut beyond, mut own) = (0, Vec::new());
-            for k in 0..chunk.len {
-                let q = stretch.q(k);
-                let measured = &chunk.values[k * width..(k + 1) * width];
-                let with_rows = (motions.len() > 0).then_some(&mut rows[..]);
-                let mut residuals =
-                    evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, with_rows);
-                for (i, row) in rows.chunks_exact(own_width).enumerate() {
-                    motions.columns(machine, q, stretch.directions(k), row, &mut columns);
-                    residuals[i] -= columns.iter().zip(&unknowns.motions).map(|(x, y)| x * y).sum::<f64>();
-                }
-                let e2 = standardised(&residuals[..count], &sigmas);
+            let mut residuals = evaluator.all_residuals(stretch);
+            if motions.len() > 0 {
+                take_motions(motions, &unknowns.motions, evaluator, stretch, &mut residuals);
+            }
+            for (k, residuals) in residuals.chunks_exact(count).enumerate() {
+                let e2 = standardised(residuals, &sigmas);
                 let (_, weight) = loss.at(e2);
                 beyond += u64::from(e2 > limits[index]);
                 if weight < 0.5 || e2 > limits[index] {
                     own.push(Suspect {
                         recording: source.label.clone(),
-                        line: chunk.lines[k],
+                        line: stretch.chunk.lines[k],
                         residual: residuals[..count.min(3)].iter().map(|r| r * r).sum::<f64>().sqrt(),
                         deviations: e2.sqrt(),
                         weight,
@@ -513,6 +505,28 @@ fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
         },
     )?;
     Ok((outliers, all))
+}
+
+/// Takes what the error motions add from the residuals of a stretch.
+fn take_motions(
+    motions: &Motions,
+    values: &[f64],
+    evaluator: &Evaluator,
+    stretch: &Stretch,
+    residuals: &mut [f64],
+) {
+    let count = evaluator.sensor.reading_count();
+    let mut work = evaluator.workspace();
+    let mut rows = vec![0.0; count * evaluator.width()];
+    let mut columns = vec![0.0; motions.len()];
+    for (k, residuals) in residuals.chunks_exact_mut(count).enumerate() {
+        let (q, measured) = (stretch.q(k), &stretch.chunk.values[k * count..(k + 1) * count]);
+        evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, Some(&mut rows));
+        for (residual, row) in residuals.iter_mut().zip(rows.chunks_exact(evaluator.width())) {
+            motions.columns(evaluator.machine, q, stretch.directions(k), row, &mut columns);
+            *residual -= columns.iter().zip(values).map(|(x, y)| x * y).sum::<f64>();
+        }
+    }
 }
 
 fn worst_first(suspects: &mut Vec<Suspect>) {

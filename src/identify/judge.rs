@@ -53,16 +53,11 @@ pub(crate) fn judge(problem: &Problem, unknowns: &Unknowns, which: Which) -> Res
         which,
         |index, stretch| {
             let (source, evaluator) = (&sources.all[index], &evaluators[index]);
-            let (count, width) = (source.sensor.reading_count(), source.recording.value_count());
+            let count = source.sensor.reading_count();
             let quantity = source.quantity(machine, 0);
             let mut own = vec![ByQuantity::<Sizes>::default(); pieces];
-            let mut work = evaluator.workspace();
-            for k in 0..stretch.chunk.len {
-                let q = stretch.q(k);
-                let measured = &stretch.chunk.values[k * width..(k + 1) * width];
-                let moment = Moment::At(stretch, k);
-                let residuals = evaluator.residuals(q, measured, moment, &mut work, None);
-                let sizes = &mut own[evaluator.piece(moment)];
+            for (k, residuals) in evaluator.all_residuals(stretch).chunks_exact(count).enumerate() {
+                let sizes = &mut own[evaluator.piece(Moment::At(stretch, k))];
                 sizes[quantity].take(&residuals[..count.min(3)]);
                 if count == 6 {
                     sizes.rad.take(&residuals[3..6]);

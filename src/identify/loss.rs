@@ -28,6 +28,15 @@ impl Default for Loss {
 }
 
 impl Loss {
+    /// Squared standardised residual up to which the loss is half of it and the weight is 1.
+    pub(super) fn plain_below(self) -> f64 {
+        match self {
+            Loss::Squares => f64::INFINITY,
+            Loss::Huber { k } => k * k,
+            Loss::Tukey { .. } => 0.0,
+        }
+    }
+
     /// Loss and weight (`loss' / e`) at the squared standardised residual `e2`.
     pub fn at(self, e2: f64) -> (f64, f64) {
         match self {
@@ -48,6 +57,15 @@ impl Loss {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_plain_has_a_weight_of_one() {
+        for loss in [Loss::Squares, Loss::Huber { k: 1.345 }, Loss::Tukey { c: 4.685 }] {
+            let e2 = 0.999 * loss.plain_below().min(1e9);
+            assert_eq!(loss.at(e2).1, 1.0);
+            assert!((loss.at(e2).0 - 0.5 * e2).abs() <= 1e-15 * e2);
+        }
+    }
 
     #[test]
     fn weight_is_the_derivative_of_the_loss_by_half_the_square() {

@@ -1,10 +1,15 @@
 //! Normal equations, accumulated sample by sample in fixed memory, `docs/model.md` (20).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix6};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-use super::evaluator::{EXTRAS, Evaluator, Moment};
+use super::basis::Basis;
+use super::blocks::{Block, Samples};
+use super::evaluator::{Evaluator, Moment};
+use super::gauge::{EXTRAS, Gauge};
 use super::loss::Loss;
 use super::noise::Noise;
 use super::source::{Source, Sources};
@@ -21,6 +26,7 @@ use crate::motion::Tracker;
 use crate::recording::Chunk;
 use crate::sensor::{MOST_READINGS, Sensor};
 use crate::units::{ByQuantity, Quantity, Rms};
+use crate::variation::Directions;
 
 /// Sums over residuals of one quantity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -86,7 +92,8 @@ pub(crate) struct Normal {
 }
 
 /// Samples with a smaller weight say nothing about the noise.
-const COUNTS: f64 = 0.25;
+pub(super) const COUNTS: f64 = 0.25;
+
 impl Normal {
     fn zero(layout: &Layout, motions: &Motions, sources: usize) -> Self {
         let len = layout.len + motions.len();
@@ -157,11 +164,17 @@ pub(crate) fn accumulate(
     values.resize(motions.len(), 0.0);
     let room = Room { motions, values: &values };
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
+    let lanes: Vec<_> = (evaluators.iter().zip(&sources.all))
+        .map(|(evaluator, source)| on_lanes(evaluator, layout, source, unknowns, motions))
+        .collect();
     let mut sums: Vec<Option<Part>> = sources.all.iter().map(|_| None).collect();
     sources.pass(
         |index, stretch| {
             let sigmas = sigmas(&sources.all[index], machine, noise[index]);
-            part(&evaluators[index], &sources.all[index], stretch, &sigmas, loss, room)
+            match &lanes[index] {
+                Some(gauges) => part_on_lanes(&evaluators[index], gauges, stretch, &sigmas, loss),
+                None => part(&evaluators[index], &sources.all[index], stretch, &sigmas, loss, room),
+            }
         },
         |index, part| match &mut sums[index] {
             None => sums[index] = Some(part),
@@ -170,7 +183,12 @@ pub(crate) fn accumulate(
     )?;
     let mut normal = Normal::zero(layout, motions, sources.all.len());
     for (index, sum) in sums.into_iter().enumerate() {
-        let Some(sum) = sum else { continue };
+        let Some(mut sum) = sum else { continue };
+        for (piece, (_, basis)) in sum.pieces.iter_mut().zip(lanes[index].iter().flatten()) {
+            if let Some(piece) = piece {
+                (piece.matrix, piece.gradient) = basis.widened(&piece.matrix, &piece.gradient);
+            }
+        }
         normal.take(sum, index, &evaluators[index], layout, &sources.all[index], unknowns);
     }
     if motions.len() > 0 {
@@ -194,6 +212,60 @@ pub(crate) struct Room<'a> {
     pub values: &'a [f64],
 }
 
+/// Recordings with fewer samples take longer to find a basis than it spares them; a matter of time alone.
+const WORTH_A_BASIS: u64 = 1000;
+
+/// The way over lanes, with the columns that sums are taken over, by piece; none where samples have to be taken one by one.
+fn on_lanes<'a>(
+    evaluator: &'a Evaluator,
+    layout: &Layout,
+    source: &Source,
+    unknowns: &Unknowns,
+    motions: &Motions,
+) -> Option<Vec<(Gauge<'a>, Basis)>> {
+    if motions.len() > 0 {
+        return None;
+    }
+    let directions = unknowns.varying.directions.as_ref();
+    let with_basis = |(piece, gauge): (usize, Gauge<'a>)| {
+        let factors = factors(directions, piece);
+        let places = places(evaluator, layout, source, &factors, gauge.width());
+        let counts: Vec<bool> = places.iter().map(|place| !place.is_empty()).collect();
+        let basis = match source.summary.samples < WORTH_A_BASIS {
+            true => Basis::plain(&counts),
+            false => Basis::of(&gauge, evaluator.machine, &counts),
+        };
+        (gauge, basis)
+    };
+    Some(evaluator.gauges()?.into_iter().enumerate().map(with_basis).collect())
+}
+
+/// What a piece weighs in each set of direction parts.
+fn factors(directions: Option<&Directions>, piece: usize) -> Vec<f64> {
+    directions.map_or(Vec::new(), |d| (0..d.sets().len()).map(|set| d.factor(set, piece)).collect())
+}
+
+/// As [`part`], over the columns of the bases alone.
+fn part_on_lanes(
+    evaluator: &Evaluator,
+    gauges: &[(Gauge, Basis)],
+    stretch: &Stretch,
+    sigmas: &[f64],
+    loss: Loss,
+) -> Part {
+    let mut part = Part { pieces: Vec::new(), loss: 0.0, tally: Tally::default() };
+    for (members, (gauge, basis)) in evaluator.members(stretch).iter().zip(gauges) {
+        let (samples, columns) = (Samples { gauge, stretch, members }, &basis.columns[..]);
+        let sum = (!members.is_empty()).then(|| Block { samples, sigmas, loss, columns }.sum());
+        if let Some(sum) = &sum {
+            part.loss += sum.loss;
+            part.tally.add(&sum.tally);
+        }
+        part.pieces.push(sum.map(|sum| Piece { matrix: sum.matrix, gradient: sum.gradient }));
+    }
+    part
+}
+
 fn part(
     evaluator: &Evaluator,
     source: &Source,
@@ -206,9 +278,7 @@ fn part(
     let width = own_width + room.motions.len();
     let chunk = &stretch.chunk;
     let values = source.recording.value_count();
-    let piece_count = evaluator.piece_count();
-    let mut members: Vec<Vec<usize>> = vec![Vec::new(); piece_count];
-    (0..chunk.len).for_each(|k| members[evaluator.piece(Moment::At(stretch, k))].push(k));
+    let members = evaluator.members(stretch);
     let mut work = evaluator.workspace();
     let mut plain = vec![0.0; count * own_width];
     let mut total = 0.0;
@@ -308,16 +378,13 @@ impl Normal {
             if source.sees_frames() {
                 turn_into_coordinates(&mut piece, evaluator, evaluator.deviations(at));
             }
-            let factors: Vec<f64> =
-                directions.map_or(Vec::new(), |d| (0..d.sets().len()).map(|s| d.factor(s, at)).collect());
-            self.scatter(&piece, evaluator, layout, source, &factors);
+            self.scatter(&piece, evaluator, layout, source, &factors(directions, at));
         }
         self.loss += sum.loss;
         self.tallies[index] = sum.tally;
     }
 
-    /// Adds local sums where their unknowns stand in the parameter vector; a column of a dyad counts for its constant deviation
-    /// and, times the set's factor, for each of its direction parts.
+    /// Adds local sums where their unknowns stand in the parameter vector.
     fn scatter(
         &mut self,
         sum: &Piece,
@@ -326,39 +393,7 @@ impl Normal {
         source: &Source,
         factors: &[f64],
     ) {
-        let machine = evaluator.machine;
-        let dyads = machine.dyads().len();
-        let mut places: Vec<Vec<(usize, f64)>> = vec![Vec::new(); sum.gradient.len()];
-        let mut put = |local: usize, len: usize, role: Role, factor: f64| {
-            if let Some(block) = layout.block(role).filter(|_| factor != 0.0) {
-                (0..len).for_each(|k| places[local + k].push((block.offset + k, factor)));
-            }
-        };
-        for j in 0..dyads {
-            let role = if j == machine.w_index() { Role::Setup(source.setup) } else { Role::Dyad(j) };
-            put(6 * j, 6, role, 1.0);
-            for (set, factor) in factors.iter().enumerate() {
-                put(6 * j, 6, Role::Part { set, dyad: j }, *factor);
-            }
-        }
-        if let Some(i) = source.tool_point.unknown() {
-            put(6 * dyads, 3, Role::ToolPoint(i), 1.0);
-        }
-        if let Some(i) = source.zero.unknown() {
-            put(6 * dyads + 3, 1, Role::Zero(i), 1.0);
-        }
-        if let Some(i) = source.length.unknown() {
-            put(6 * dyads + 4, 1, Role::Length(i), 1.0);
-        }
-        if let Some(i) = source.tool_rotation.unknown() {
-            put(6 * dyads + 5, 3, Role::ToolRotation(i), 1.0);
-        }
-        for local in 6 * dyads + EXTRAS..evaluator.width() {
-            put(local, 1, Role::Term(local - 6 * dyads - EXTRAS), 1.0);
-        }
-        for (i, place) in places[evaluator.width()..].iter_mut().enumerate() {
-            place.push((layout.len + i, 1.0));
-        }
+        let places = places(evaluator, layout, source, factors, sum.gradient.len());
         for (a, to) in places.iter().enumerate() {
             for (to_a, factor_a) in to {
                 self.gradient[*to_a] += factor_a * sum.gradient[a];
@@ -370,6 +405,51 @@ impl Normal {
             }
         }
     }
+}
+
+/// Where each column of a row counts in the parameter vector, and with what factor: one of a dyad for its constant deviation and, times
+/// the set's factor, for each of its direction parts.
+fn places(
+    evaluator: &Evaluator,
+    layout: &Layout,
+    source: &Source,
+    factors: &[f64],
+    width: usize,
+) -> Vec<Vec<(usize, f64)>> {
+    let machine = evaluator.machine;
+    let dyads = machine.dyads().len();
+    let mut places: Vec<Vec<(usize, f64)>> = vec![Vec::new(); width];
+    let mut put = |local: usize, len: usize, role: Role, factor: f64| {
+        if let Some(block) = layout.block(role).filter(|_| factor != 0.0) {
+            (0..len).for_each(|k| places[local + k].push((block.offset + k, factor)));
+        }
+    };
+    for j in 0..dyads {
+        let role = if j == machine.w_index() { Role::Setup(source.setup) } else { Role::Dyad(j) };
+        put(6 * j, 6, role, 1.0);
+        for (set, factor) in factors.iter().enumerate() {
+            put(6 * j, 6, Role::Part { set, dyad: j }, *factor);
+        }
+    }
+    if let Some(i) = source.tool_point.unknown() {
+        put(6 * dyads, 3, Role::ToolPoint(i), 1.0);
+    }
+    if let Some(i) = source.zero.unknown() {
+        put(6 * dyads + 3, 1, Role::Zero(i), 1.0);
+    }
+    if let Some(i) = source.length.unknown() {
+        put(6 * dyads + 4, 1, Role::Length(i), 1.0);
+    }
+    if let Some(i) = source.tool_rotation.unknown() {
+        put(6 * dyads + 5, 3, Role::ToolRotation(i), 1.0);
+    }
+    for local in 6 * dyads + EXTRAS..evaluator.width() {
+        put(local, 1, Role::Term(local - 6 * dyads - EXTRAS), 1.0);
+    }
+    for (i, place) in places[evaluator.width()..].iter_mut().enumerate() {
+        place.push((layout.len + i, 1.0));
+    }
+    places
 }
 
 /// A point in space from a slice.
@@ -439,7 +519,7 @@ pub(crate) fn matrix_in_general(
         let motion = Tracker::new(vec![0.0; commands], vec![1; commands]).follow(&chunk);
         // What terms see in general is not asked.
         let features = unknowns.varying.features().map(|_| vec![0.0; samples]).collect();
-        let stretch = Stretch { chunk, motion, features, commands };
+        let stretch = Stretch { chunk: Arc::new(chunk), motion, features, commands };
         let sigmas = vec![1.0; source.sensor.reading_count()];
         let none = Room { motions: &Motions::default(), values: &[] };
         let part = part(&evaluator, source, &stretch, &sigmas, Loss::Squares, none);
@@ -450,7 +530,106 @@ pub(crate) fn matrix_in_general(
 
 #[cfg(test)]
 mod tests {
+    use rand::RngExt;
+
     use super::*;
+    use crate::recording::Recording;
+    use crate::variation::CONSTANT;
+
+    /// Samples of the reference machine with deviations, many enough for a basis, some of them far off.
+    fn of_lanes_and_one_by_one(head: &str, columns: &str, values: usize, samples: usize) {
+        let text = include_str!("../../machines/ac_table_tilting.ron");
+        let machine = Machine::parse("ac_table_tilting.ron", text).expect("a machine");
+        let mut random = StdRng::seed_from_u64(5);
+        let mut text = format!("{head}a[rad],c[rad],y[m],x[m],z[m],{columns}\n");
+        for k in 0..samples {
+            let row: Vec<String> = (0..5 + values)
+                .map(|c| if c < 2 { 2.0 } else { 0.2 } * random.random_range(-1.0..1.0f64))
+                .map(|x| (x + if k % 97 == 0 { 0.3 } else { 0.0 }).to_string())
+                .collect();
+            text.push_str(&(row.join(",") + "\n"));
+        }
+        let recordings =
+            [Recording::from_bytes("drawn.csv", text.into_bytes(), &machine).expect("a recording")];
+        let sources = Sources::new(&recordings, &machine, &CONSTANT, &[], &|_| {}).expect("sources");
+        let layout = Layout::new(&machine, &sources, &CONSTANT, 1.0);
+        let mut unknowns = Unknowns::nominal(&machine, &sources, &CONSTANT);
+        for dh in &mut unknowns.dh {
+            *dh = Twist::from_array(std::array::from_fn(|_| random.random_range(-1e-3..1e-3)));
+        }
+        let (source, none) = (&sources.all[0], Motions::default());
+        let evaluator = Evaluator::new(&machine, &unknowns, source);
+        let lanes = on_lanes(&evaluator, &layout, source, &unknowns, &none).expect("a way over lanes");
+        let sigmas = vec![0.1; source.sensor.reading_count()];
+        let (mut one_by_one, mut over_lanes) = (Vec::new(), Vec::new());
+        for (sums, on_lanes) in [(&mut one_by_one, false), (&mut over_lanes, true)] {
+            let work = |_: usize, stretch: &Stretch| match on_lanes {
+                true => part_on_lanes(&evaluator, &lanes, stretch, &sigmas, Loss::default()),
+                false => {
+                    let room = Room { motions: &none, values: &[] };
+                    part(&evaluator, source, stretch, &sigmas, Loss::default(), room)
+                }
+            };
+            sources.pass(work, |_, part| sums.push(part)).expect("a pass");
+        }
+        for (one, lanes_part) in one_by_one.iter().zip(&over_lanes) {
+            let (Some(one_piece), Some(piece)) = (&one.pieces[0], &lanes_part.pieces[0]) else {
+                unreachable!("one piece")
+            };
+            let (matrix, gradient) = lanes[0].1.widened(&piece.matrix, &piece.gradient);
+            // What counts nowhere stays out over lanes.
+            let counts: Vec<bool> = places(&evaluator, &layout, source, &[], gradient.len())
+                .iter()
+                .map(|place| !place.is_empty())
+                .collect();
+            for a in (0..counts.len()).filter(|a| counts[*a]) {
+                let bound = 1e-9 * one_piece.matrix[(a, a)].sqrt();
+                let size = 1e-9 * one_piece.gradient.amax();
+                assert!((one_piece.gradient[a] - gradient[a]).abs() <= size, "gradient {a}");
+                for b in (0..counts.len()).filter(|b| counts[*b]) {
+                    let bound = bound * one_piece.matrix[(b, b)].sqrt();
+                    assert!((one_piece.matrix[(a, b)] - matrix[(a, b)]).abs() <= bound, "{a}, {b}");
+                }
+            }
+            assert!((one.loss / lanes_part.loss - 1.0).abs() < 1e-12);
+            let (sums, other) = (one.tally.residuals.m, lanes_part.tally.residuals.m);
+            assert_eq!((sums.rows, sums.inliers), (other.rows, other.inliers));
+            assert_eq!(one.tally.down_weighted, lanes_part.tally.down_weighted);
+            assert!((sums.squares / other.squares - 1.0).abs() < 1e-12);
+            assert!((sums.inlier_squares / other.inlier_squares - 1.0).abs() < 1e-12);
+        }
+        let all: Vec<f64> = evaluator_residuals(&sources, &evaluator, true);
+        let exact = evaluator_residuals(&sources, &evaluator, false);
+        assert!(all.iter().zip(&exact).all(|(a, b)| (a - b).abs() < 1e-14));
+    }
+
+    fn evaluator_residuals(sources: &Sources, evaluator: &Evaluator, at_once: bool) -> Vec<f64> {
+        let mut all = Vec::new();
+        let work = |_: usize, stretch: &Stretch| {
+            if at_once {
+                return evaluator.all_residuals(stretch);
+            }
+            let (mut work, count) = (evaluator.workspace(), evaluator.sensor.reading_count());
+            let one = |k: usize, work: &mut _| {
+                let measured = &stretch.chunk.values[k * count..(k + 1) * count];
+                evaluator.residuals(stretch.q(k), measured, Moment::At(stretch, k), work, None)
+            };
+            (0..stretch.chunk.len).flat_map(|k| one(k, &mut work)[..count].to_vec()).collect()
+        };
+        sources.pass(work, |_, own| all.extend(own)).expect("a pass");
+        all
+    }
+
+    #[test]
+    fn sums_over_lanes_are_those_over_samples_one_by_one() {
+        let head = "# measurement: distance\n# nominal_length: unknown\n# tool_point: unknown ball\n";
+        for samples in [130, 5001] {
+            of_lanes_and_one_by_one(head, "d[m]", 1, samples);
+            of_lanes_and_one_by_one("# measurement: position\n", "px[m],py[m],pz[m]", 3, samples);
+            let head = "# measurement: displacement\n# direction: 0.6,0,0.8\n# zero: unknown\n";
+            of_lanes_and_one_by_one(head, "s[m]", 1, samples);
+        }
+    }
 
     #[test]
     fn strips_of_a_square_make_the_whole() {

@@ -51,7 +51,7 @@ impl Solver {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stop {
-    /// The next step promises a relative decrease of the objective below rounding.
+    /// The next step promises a decrease of the objective that changes nothing, or is below rounding.
     Converged,
     /// The number of steps asked for is used up.
     Steps,
@@ -101,6 +101,12 @@ pub(crate) struct Solution {
 const MOST_STEPS: usize = 200;
 /// Relative decrease of the objective that counts as rounding.
 const SETTLED: f64 = 1e-13;
+/// Decrease of the objective, half of chi-square, that no longer moves any parameter by a ten-thousandth of its standard error.
+const NOTHING: f64 = 1e-9;
+/// Damping of the first step, where a tolerance has a weight of 1: it must not outweigh the prior, however many samples there are.
+const FIRST_DAMPING: f64 = 1e-3;
+/// Part of the largest eigenvalue up to which those of directions that nothing sees may come by rounding.
+const ROUNDING: f64 = 1e-13;
 /// Eigenvalues below this part of the largest are not seen by the data.
 const UNSEEN: f64 = 1e-14;
 
@@ -237,7 +243,7 @@ impl<'a> Problem<'a> {
             let eigen = SymmetricEigen::new(matrix);
             let largest = eigen.eigenvalues.amax();
             let along = eigen.eigenvectors.tr_mul(&gradient);
-            let mut mu: f64 = damping.unwrap_or(1e-9 * largest);
+            let mut mu: f64 = damping.unwrap_or(FIRST_DAMPING.max(ROUNDING * largest));
             loop {
                 // (21): one step, in the eigenvectors' coordinates; what the data do not see stays.
                 let amounts = DVector::from_fn(along.len(), |i, _| {
@@ -247,7 +253,7 @@ impl<'a> Problem<'a> {
                 let promised: f64 = (0..along.len())
                     .map(|i| amounts[i] * (along[i] - 0.5 * eigen.eigenvalues[i] * amounts[i]))
                     .sum();
-                if promised <= SETTLED * objective || !promised.is_finite() {
+                if promised <= NOTHING.max(SETTLED * objective) || !promised.is_finite() {
                     break 'outer Stop::Converged;
                 }
                 if steps >= MOST_STEPS {
@@ -289,7 +295,7 @@ impl<'a> Problem<'a> {
         };
         let most = match solver {
             Solver::FixedDamping { steps, .. } => steps,
-            _ => MOST_STEPS.min(50),
+            _ => 50,
         };
         let mut unknowns = start;
         let mut normal = self.normal(&unknowns, noise)?;

@@ -1,5 +1,7 @@
 //! Consecutive samples with all that a model may depend on.
 
+use std::sync::Arc;
+
 use crate::error::Result;
 use crate::feature::{Feature, Follow, FollowOptions, Memory, first_directions, gravity_of};
 use crate::lie::Vec3;
@@ -11,7 +13,7 @@ use crate::variation::Varying;
 /// Samples, their directions of travel, and the values of all features.
 #[derive(Debug)]
 pub(crate) struct Stretch {
-    pub chunk: Chunk,
+    pub chunk: Arc<Chunk>,
     /// Empty where nothing depends on directions.
     pub motion: Motion,
     /// One column for each part of each term, in their order.
@@ -38,7 +40,7 @@ impl Stretch {
         let kept: Vec<usize> = (0..self.chunk.len).filter(|k| on(self.chunk.lines[*k])).collect();
         let column = |column: &Vec<f64>| kept.iter().map(|k| column[*k]).collect();
         Stretch {
-            chunk: self.chunk.chosen(&kept),
+            chunk: Arc::new(self.chunk.chosen(&kept)),
             motion: self.motion.chosen(self.commands, &kept),
             features: self.features.iter().map(column).collect(),
             commands: self.commands,
@@ -116,7 +118,7 @@ pub(crate) fn stretches<'a>(
     memories: &'a mut Memories,
 ) -> Result<Box<dyn Iterator<Item = Result<Stretch>> + 'a>> {
     let commands = machine.commands().len();
-    let chunks = recording.chunks()?;
+    let chunks = recording.shared_chunks()?;
     let Some(beginning) = beginning else {
         let plain = move |chunk| Stretch { chunk, motion: Motion::default(), features: Vec::new(), commands };
         return Ok(Box::new(chunks.map(move |chunk| chunk.map(plain))));
@@ -139,12 +141,12 @@ pub(crate) fn stretches<'a>(
         channels: recording.extra_channels().iter().map(|c| c.name.clone()).collect(),
         with_gravity: varying.features().any(Feature::needs_gravity),
     };
-    Ok(Box::new(Follow::new(machine, chunks, &options).map(move |item| {
+    Ok(Box::new(Follow::new(machine, recording.chunks()?, &options).map(move |item| {
         item.map(|(chunk, samples)| {
             let features = (varying.features().zip(&mut memories.0))
                 .map(|(feature, memory)| feature.column(&samples, &[], 1.0, memory))
                 .collect();
-            Stretch { motion: tracker.follow(&chunk), chunk, features, commands }
+            Stretch { motion: tracker.follow(&chunk), chunk: Arc::new(chunk), features, commands }
         })
     })))
 }

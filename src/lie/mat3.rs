@@ -1,4 +1,6 @@
 //! A 3 × 3 matrix, rows first, for rotations and the small matrices around them.
+//!
+//! Everything is written out: what takes closures is not inlined dependably, and would tear lanes out of their kernel.
 
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +38,8 @@ impl<S: Scalar> Mat3<S> {
     /// Every element times `factor`.
     #[inline(always)]
     pub fn times(self, factor: S) -> Self {
-        Mat3(self.0.map(|row| row.map(|c| c * factor)))
+        let [x, y, z] = self.0;
+        Mat3([Vec3(x).times(factor).0, Vec3(y).times(factor).0, Vec3(z).times(factor).0])
     }
 
     /// Column `j`.
@@ -50,7 +53,8 @@ impl Mat3<f64> {
     /// The same matrix as constants of the kind of `like`.
     #[inline(always)]
     pub fn lift<S: Scalar>(self, like: S) -> Mat3<S> {
-        Mat3(self.0.map(|row| row.map(|c| like.lift(c))))
+        let [x, y, z] = self.0;
+        Mat3([Vec3(x).lift(like).0, Vec3(y).lift(like).0, Vec3(z).lift(like).0])
     }
 }
 
@@ -58,8 +62,8 @@ impl<S: Scalar> Mul for Mat3<S> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
-        let columns = [o.column(0), o.column(1), o.column(2)];
-        Mat3(self.0.map(|row| columns.map(|c| Vec3(row).dot(c))))
+        let (x, y, z) = (self * o.column(0), self * o.column(1), self * o.column(2));
+        Mat3([x.0, y.0, z.0]).transpose()
     }
 }
 
@@ -67,7 +71,8 @@ impl<S: Scalar> Mul<Vec3<S>> for Mat3<S> {
     type Output = Vec3<S>;
     #[inline(always)]
     fn mul(self, x: Vec3<S>) -> Vec3<S> {
-        Vec3(self.0.map(|row| Vec3(row).dot(x)))
+        let [a, b, c] = self.0;
+        Vec3([Vec3(a).dot(x), Vec3(b).dot(x), Vec3(c).dot(x)])
     }
 }
 
@@ -75,6 +80,7 @@ impl<S: Scalar> Add for Mat3<S> {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
-        Mat3(std::array::from_fn(|i| (Vec3(self.0[i]) + Vec3(o.0[i])).0))
+        let ([a, b, c], [x, y, z]) = (self.0, o.0);
+        Mat3([(Vec3(a) + Vec3(x)).0, (Vec3(b) + Vec3(y)).0, (Vec3(c) + Vec3(z)).0])
     }
 }

@@ -26,20 +26,22 @@ impl<S: Scalar> Vec3<S> {
     /// Inner product.
     #[inline(always)]
     pub fn dot(self, other: Self) -> S {
-        self.0[0] * other.0[0] + self.0[1] * other.0[1] + self.0[2] * other.0[2]
+        let ([a, b, c], [x, y, z]) = (self.0, other.0);
+        c.mul_add(z, b.mul_add(y, a * x))
     }
 
     /// Vector product `self × other`.
     #[inline(always)]
     pub fn cross(self, other: Self) -> Self {
         let ([a, b, c], [x, y, z]) = (self.0, other.0);
-        Vec3([b * z - c * y, c * x - a * z, a * y - b * x])
+        Vec3([b.mul_add(z, -(c * y)), c.mul_add(x, -(a * z)), a.mul_add(y, -(b * x))])
     }
 
     /// Every component times `factor`.
     #[inline(always)]
     pub fn times(self, factor: S) -> Self {
-        Vec3(self.0.map(|c| c * factor))
+        let [x, y, z] = self.0;
+        Vec3([x * factor, y * factor, z * factor])
     }
 
     /// Euclidean length; its derivative exists only away from zero.
@@ -53,7 +55,8 @@ impl Vec3<f64> {
     /// The same vector as constants of the kind of `like`.
     #[inline(always)]
     pub fn lift<S: Scalar>(self, like: S) -> Vec3<S> {
-        Vec3(self.0.map(|c| like.lift(c)))
+        let [x, y, z] = self.0;
+        Vec3([like.lift(x), like.lift(y), like.lift(z)])
     }
 }
 
@@ -77,7 +80,8 @@ impl<S: Scalar> Neg for Vec3<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Vec3(self.0.map(|c| -c))
+        let [x, y, z] = self.0;
+        Vec3([-x, -y, -z])
     }
 }
 

@@ -1,5 +1,7 @@
 //! From rows to chunks: one pass over the data, bounded memory, SI.
 
+use std::sync::Arc;
+
 use super::Recording;
 use super::RecordingFault as Fault;
 use super::column::{Column, Layout, Role};
@@ -33,6 +35,13 @@ pub struct Chunk {
 }
 
 impl Chunk {
+    /// Bytes that its numbers take up.
+    pub(super) fn bytes(&self) -> usize {
+        let optional = self.time.iter().chain(self.directions.iter().flatten()).map(Vec::len).sum::<usize>();
+        let channels = self.channels.iter().map(Vec::len).sum::<usize>();
+        8 * (self.lines.len() + self.commands.len() + self.values.len() + optional + channels)
+    }
+
     /// These samples alone, by their index; the count of dropped rows is left behind.
     pub fn chosen(&self, samples: &[usize]) -> Chunk {
         let rows = |all: &[f64]| -> Vec<f64> {
@@ -53,12 +62,37 @@ impl Chunk {
 }
 
 /// Samples of one pass, in chunks; see [`Recording::chunks`].
-pub struct Chunks<'a> {
-    pub(super) pass: Pass<'a>,
-    ended: bool,
+pub struct Chunks<'a>(From<'a>);
+
+enum From<'a> {
+    Memory(std::slice::Iter<'a, Arc<Chunk>>),
+    File(Box<Read<'a>>),
+}
+
+impl<'a> Chunks<'a> {
+    pub(super) fn kept(chunks: &'a [Arc<Chunk>]) -> Self {
+        Chunks(From::Memory(chunks.iter()))
+    }
 }
 
 impl Iterator for Chunks<'_> {
+    type Item = Result<Chunk>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        match &mut self.0 {
+            From::Memory(chunks) => chunks.next().map(|chunk| Ok(Chunk::clone(chunk))),
+            From::File(read) => read.next(),
+        }
+    }
+}
+
+/// Samples as they are read.
+pub(super) struct Read<'a> {
+    pub pass: Pass<'a>,
+    ended: bool,
+}
+
+impl Iterator for Read<'_> {
     type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -196,7 +230,11 @@ impl<'a> Pass<'a> {
     }
 
     pub fn chunks(self) -> Chunks<'a> {
-        Chunks { pass: self, ended: false }
+        Chunks(From::File(Box::new(self.read())))
+    }
+
+    pub fn read(self) -> Read<'a> {
+        Read { pass: self, ended: false }
     }
 
     pub fn with_text(self) -> Rows<'a> {

@@ -2,6 +2,7 @@
 
 use super::Recording;
 use super::column::Role;
+use super::kept::{Keeping, Kept};
 use super::reader::{Chunk, Pass};
 use super::text::Fail;
 use super::{RecordingFault as Fault, entry};
@@ -88,22 +89,24 @@ impl Steps {
     }
 }
 
-pub(super) fn scan(recording: &Recording) -> Result<Summary> {
+pub(super) fn scan(recording: &Recording) -> Result<Kept> {
     let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.fixed.len()];
     let (mut samples, mut dropped) = (0, 0);
     let (mut time, mut steps) = (None, Steps::new());
     let mut longest = (0.0, 0);
-    let mut chunks = Pass::start(recording)?.chunks();
+    let mut keeping = Keeping::default();
+    let mut chunks = Pass::start(recording)?.read();
     for chunk in &mut chunks {
-        let Chunk { len, lines, time: times, commands, dropped: left_out, .. } = chunk?;
-        samples += len as u64;
+        let chunk = chunk?;
+        let Chunk { len, lines, time: times, commands, dropped: left_out, .. } = &chunk;
+        samples += *len as u64;
         dropped += left_out;
         for row in commands.chunks_exact(ranges.len()) {
             for (range, value) in ranges.iter_mut().zip(row) {
                 *range = (range.0.min(*value), range.1.max(*value));
             }
         }
-        for (t, line) in times.into_iter().flatten().zip(lines) {
+        for (t, line) in times.iter().flatten().copied().zip(lines.iter().copied()) {
             let (first, last) = time.unwrap_or((t, t));
             if t > last {
                 steps.take(t - last);
@@ -113,6 +116,7 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
             }
             time = Some((first, t));
         }
+        keeping.take(chunk);
     }
     let pass = chunks.pass;
     if pass.rows == 0 {
@@ -142,7 +146,7 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
     if pauses > 0 && samples >= STEADY {
         warn_of_jump(longest, time, &mut warnings);
     }
-    Ok(Summary {
+    Ok(keeping.with(Summary {
         rows: pass.rows,
         samples,
         dropped,
@@ -153,7 +157,7 @@ pub(super) fn scan(recording: &Recording) -> Result<Summary> {
         pause_after,
         pauses,
         warnings,
-    })
+    }))
 }
 
 /// A pause longer than all the rest of the recording may be none: whatever drifts with time hangs on it alone.

@@ -6,13 +6,13 @@ use pulp::Arch;
 const FAR: f64 = 700.0;
 const FAR_ROUND: f64 = 1e6;
 /// Added to a number this rounds it to a whole one, which then stands in the last bits.
-const ROUND: f64 = 6_755_399_441_055_744.0;
+pub(super) const ROUND: f64 = 6_755_399_441_055_744.0;
 /// `ln 2` in two parts: the first times a whole number up to 2000 is exact.
 const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
 /// `π/2` in three parts: the first two times a whole number below a million are exact.
-const HALF_PI: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
-/// Series of the exponential, of the sine over its angle and of the cosine by the square of the angle: one over the factorials, from the
-/// highest one that makes a difference.
+pub(super) const HALF_PI: [f64; 3] =
+    [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
+/// Series of the exponential: one over the factorials, from the highest one that makes a difference.
 const EXPONENTIAL: [f64; 14] = [
     1.0 / 6_227_020_800.0,
     1.0 / 479_001_600.0,
@@ -29,27 +29,23 @@ const EXPONENTIAL: [f64; 14] = [
     1.0,
     1.0,
 ];
-const SINE: [f64; 9] = [
-    1.0 / 355_687_428_096_000.0,
-    -1.0 / 1_307_674_368_000.0,
-    1.0 / 6_227_020_800.0,
-    -1.0 / 39_916_800.0,
-    1.0 / 362_880.0,
-    -1.0 / 5_040.0,
-    1.0 / 120.0,
-    -1.0 / 6.0,
-    1.0,
+/// `(sin r / r - 1) / r²` and `(cos r - 1 + r²/2) / r⁴` up to an eighth of a turn, from the highest power of `r²`: of all polynomials those
+/// whose largest error is least (Remez), 3.4e-18 of the sine and 4.7e-20 of the cosine.
+pub(super) const SINE: [f64; 6] = [
+    1.589_682_670_136_347_4e-10,
+    -2.505_075_862_975_759_4e-8,
+    2.755_731_369_505_555_8e-6,
+    -1.984_126_982_981_637e-4,
+    8.333_333_333_322_424e-3,
+    -0.166_666_666_666_666_32,
 ];
-const COSINE: [f64; 9] = [
-    1.0 / 20_922_789_888_000.0,
-    -1.0 / 87_178_291_200.0,
-    1.0 / 479_001_600.0,
-    -1.0 / 3_628_800.0,
-    1.0 / 40_320.0,
-    -1.0 / 720.0,
-    1.0 / 24.0,
-    -0.5,
-    1.0,
+pub(super) const COSINE: [f64; 6] = [
+    -1.135_966_977_004_655_3e-11,
+    2.087_572_368_232_159_6e-9,
+    -2.755_731_435_522_394_3e-7,
+    2.480_158_728_949_175_2e-5,
+    -1.388_888_888_887_413_8e-3,
+    0.041_666_666_666_666_6,
 ];
 
 /// `e` to the power of each, to one or two units in the last place.
@@ -70,18 +66,10 @@ fn near(x: f64) -> f64 {
     series(&EXPONENTIAL, r) * f64::from_bits(rounded.to_bits().wrapping_add(1023) << 52)
 }
 
-/// Sines and cosines of angles in rad, to 1e-15.
-pub(crate) fn sines_cosines(angles: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    if !angles.iter().all(|x| x.abs() < FAR_ROUND) {
-        return angles.iter().map(|x| x.sin_cos()).unzip();
-    }
-    let (mut sines, mut cosines) = (angles.to_vec(), vec![0.0; angles.len()]);
-    Arch::new().dispatch(|| {
-        for (sine, cosine) in sines.iter_mut().zip(&mut cosines) {
-            (*sine, *cosine) = turned(*sine);
-        }
-    });
-    (sines, cosines)
+/// Sine and cosine of an angle in rad, to 1e-15.
+#[inline(always)]
+pub(super) fn sine_cosine(x: f64) -> (f64, f64) {
+    if x.abs() < FAR_ROUND { turned(x) } else { x.sin_cos() }
 }
 
 /// Sine and cosine of what is left beside whole quarter turns, without a branch.
@@ -91,7 +79,8 @@ fn turned(x: f64) -> (f64, f64) {
     let n = rounded - ROUND;
     let r = ((x - n * HALF_PI[0]) - n * HALF_PI[1]) - n * HALF_PI[2];
     let (quarter, square) = (rounded.to_bits(), r * r);
-    let (sine, cosine) = (r * series(&SINE, square), series(&COSINE, square));
+    let sine = r + (r * square) * series(&SINE, square);
+    let cosine = 1.0 + square * (square * series(&COSINE, square) - 0.5);
     let is_odd = quarter & 1 == 1;
     let (sine, cosine) = if is_odd { (cosine, sine) } else { (sine, cosine) };
     // A sign in the first bit: of the sine in the third and fourth quarter, of the cosine in the second and third.
@@ -107,22 +96,7 @@ fn series<const N: usize>(coefficients: &[f64; N], x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{exponentials, sines_cosines};
-
-    #[test]
-    fn sines_and_cosines_are_those_of_the_standard_library() {
-        for scale in [1e-3, 0.01, 1.0, 9.9] {
-            let at: Vec<f64> = (-100_000..=100_000).map(|k| scale * (f64::from(k) + 0.3)).collect();
-            let (sines, cosines) = sines_cosines(&at);
-            for ((x, sine), cosine) in at.iter().zip(sines).zip(cosines) {
-                let exact = x.sin_cos();
-                assert!((sine - exact.0).abs() < 1e-15, "{x}: {sine} {}", exact.0);
-                assert!((cosine - exact.1).abs() < 1e-15, "{x}: {cosine} {}", exact.1);
-            }
-        }
-        let (sines, cosines) = sines_cosines(&[0.0, f64::NAN, 1e7]);
-        assert!(sines[0] == 0.0 && cosines[0] == 1.0 && sines[1].is_nan() && sines[2] == 1e7f64.sin());
-    }
+    use super::exponentials;
 
     #[test]
     fn exponentials_are_those_of_the_standard_library() {

@@ -9,6 +9,7 @@ mod mutated;
 mod arrays;
 mod bad_effects;
 mod bad_machines;
+mod batch;
 mod calibrated;
 mod compensate;
 mod effects;

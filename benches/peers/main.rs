@@ -1,0 +1,111 @@
+//! The peers' workloads (W1 to W5) on this library, in lines that join the peers' table:
+//!
+//! ```text
+//! RAYON_NUM_THREADS=1 PEERS_WORKLOADS=folder cargo bench --bench peers
+//! ```
+//!
+//! The folder holds the `.bin` files that the peers' generator writes. Times are of the wall clock, so that the machine should be quiet.
+
+mod workload;
+
+use kincal::Machine;
+use kincal::chain::Batch;
+use kincal::identify::{CalibrateOptions, Loss, Solver, calibrate};
+use kincal::lie::Vec3;
+use kincal::nalgebra::DMatrix;
+use kincal::recording::Recording;
+
+use workload::{Folder, MACHINE_ORDER, ac_machine, by_column, by_row, largest_difference, result, time};
+
+fn main() {
+    let Some(folder) = Folder::given() else {
+        println!("0 of 5 workloads: PEERS_WORKLOADS names no folder");
+        return;
+    };
+    let machine = ac_machine();
+    forward_kinematics(&folder, &machine);
+    distance_rows(&folder, &machine);
+    arm_jacobian(&folder);
+    identification(&folder, &machine, "W3", "w3_samples");
+    identification(&folder, &machine, "W4", "w4_samples");
+}
+
+/// W1: where the tool of the nominal machine is at 100 000 random commands.
+fn forward_kinematics(folder: &Folder, machine: &Machine) {
+    let chain = folder.chain(machine, "poses_nominal");
+    let (joints, reference) = (folder.numbers("w1_joints"), folder.numbers("w1.ref"));
+    let q = by_column(&joints, &MACHINE_ORDER);
+    let (batch, units) = (Batch::new(&chain), q.nrows());
+    let mut poses = DMatrix::zeros(units, 12);
+    let seconds = time(21, || batch.w_from_t_into(&q, &mut poses));
+    result("W1", "kincal batch", &seconds, units, largest_difference(&by_row(&poses), &reference), "");
+    let mut found = vec![0.0; reference.len()];
+    let seconds = time(21, || {
+        for (q, pose) in joints.chunks_exact(5).zip(found.chunks_exact_mut(12)) {
+            let w_from_t = chain.w_from_t(&MACHINE_ORDER.map(|k| q[k]));
+            for row in 0..3 {
+                pose[4 * row..4 * row + 3].copy_from_slice(&w_from_t.rotation.0[row]);
+                pose[4 * row + 3] = w_from_t.translation.0[row];
+            }
+        }
+    });
+    result("W1", "kincal one at a time", &seconds, units, largest_difference(&found, &reference), "");
+}
+
+/// W2: a distance and its row of 42 at 100 000 samples of a machine with errors.
+fn distance_rows(folder: &Folder, machine: &Machine) {
+    let batch = Batch::new(&folder.chain(machine, "poses_general"));
+    let (joints, reference) = (folder.numbers("w2_joints"), folder.numbers("w2.ref"));
+    let q = by_column(&joints, &MACHINE_ORDER);
+    let (units, origin) = (q.nrows(), Vec3([0.0; 3]));
+    let mut rows = DMatrix::zeros(units, 43);
+    let seconds = time(21, || batch.distance_rows_into(&q, origin, origin, &mut rows));
+    let check = largest_difference(&folder.rows_of_left_increments("poses_general", &rows), &reference);
+    result("W2", "kincal batch", &seconds, units, check, "rows of increments behind exp(dh); turned untimed");
+    let few = q.rows(0, 96).into_owned();
+    let mut rows = DMatrix::zeros(96, 43);
+    let seconds = time(21, || {
+        for _ in 0..units / 96 {
+            batch.distance_rows_into(&few, origin, origin, &mut rows);
+        }
+    });
+    result("W2", "kincal batch; L1-resident output", &seconds, units / 96 * 96, f64::NAN, "");
+}
+
+/// W5a: the geometric Jacobian of a six-joint arm at 100 000 random commands.
+fn arm_jacobian(folder: &Folder) {
+    let (joints, reference) = (folder.numbers("w5_joints"), folder.numbers("w5.ref"));
+    let batch = Batch::new(&folder.arm(&workload::arm_machine()));
+    let q = by_column(&joints, &[0, 1, 2, 3, 4, 5]);
+    let units = q.nrows();
+    let mut velocities = DMatrix::zeros(units, 36);
+    let seconds = time(21, || batch.velocities_into(&q, Vec3([0.0; 3]), &mut velocities));
+    // Theirs is row by row, ours command by command.
+    let theirs = DMatrix::from_fn(units, 36, |k, i| velocities[(k, 6 * (i % 6) + i / 6)]);
+    result("W5a", "kincal batch", &seconds, units, largest_difference(&by_row(&theirs), &reference), "");
+}
+
+/// W3 and W4: 42 parameters from distances, by ten steps of fixed damping and to the solution.
+fn identification(folder: &Folder, machine: &Machine, name: &str, file: &str) {
+    let samples = folder.numbers(file);
+    let text = workload::distances(&samples);
+    let recordings =
+        [Recording::from_bytes("distances.csv", text.into_bytes(), machine).expect("a recording")];
+    recordings[0].scan().expect("readable rows");
+    let options = |solver| CalibrateOptions::default().with_loss(Loss::Squares).with_solver(solver);
+    let (units, runs) = (samples.len() / 6, if samples.len() > 100_000 { 3 } else { 11 });
+    let after = |steps| {
+        time(runs, || {
+            calibrate(machine, &recordings, options(Solver::FixedDamping { tau: 1e-8, steps }))
+                .expect("a fit");
+        })
+    };
+    // What is not a pass is the same in both.
+    let (few, many) = (after(10), after(30));
+    let passes: Vec<f64> = few.iter().zip(&many).map(|(few, many)| (many - few) / 20.0).collect();
+    result(name, "kincal pass", &passes, units, f64::NAN, "one pass over the samples");
+    let seconds = time(runs, || {
+        calibrate(machine, &recordings, options(Solver::default())).expect("a fit");
+    });
+    result(name, "kincal to the solution", &seconds, units, f64::NAN, "whole call; tolerances as prior");
+}

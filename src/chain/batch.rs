@@ -1,0 +1,175 @@
+//! A chain at many commands at a time.
+
+use nalgebra::DMatrix;
+use pulp::{Arch, Simd, WithSimd};
+
+use super::{Chain, Moved, Path};
+use crate::lie::{Twist, Vec3, Wrench};
+use crate::scalar::{Lanes, MOST_LANES, Scalar};
+
+/// A chain that is laid out for many samples, which are computed as many at a time as the machine has SIMD lanes. Commands and results
+/// are matrices with one row for each sample.
+///
+/// ```
+/// use kincal::chain::{Batch, Chain};
+/// use kincal::nalgebra::dmatrix;
+/// use kincal::Machine;
+///
+/// let machine = Machine::parse("table.ron", r#"Machine(
+///     name: "table", units: (length: mm, angle: deg),
+///     workpiece: [(frame: "c", joint: Revolute(axis: "z")), (frame: "w")],
+///     tool: [(frame: "x", joint: Prismatic(axis: "x")), (frame: "t", at: (0, 0, 80))],
+/// )"#)?;
+/// let chain = Chain::nominal(&machine);
+/// // C in rad, X in m.
+/// let poses = Batch::new(&chain).w_from_t(&dmatrix![0.0, 0.0; 0.1, 0.05; 0.2, 0.1]);
+/// assert_eq!(poses.shape(), (3, 12));
+/// let third = chain.w_from_t(&[0.2, 0.1]);
+/// assert!((poses[(2, 3)] - third.translation.0[0]).abs() < 1e-15);
+/// # Ok::<(), kincal::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Batch {
+    path: Path,
+}
+
+impl Batch {
+    /// Lays out a chain.
+    pub fn new(chain: &Chain<f64>) -> Self {
+        Batch { path: Path::new(chain) }
+    }
+
+    /// `w_from_t`, `docs/model.md` (10), at every row of `commands`, m or rad: twelve columns, the first three rows of the 4 × 4 matrix one
+    /// after the other; the fourth, eighth and twelfth are the translation, m.
+    ///
+    /// # Panics
+    /// If there are fewer columns than commands.
+    pub fn w_from_t(&self, commands: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut poses = DMatrix::zeros(commands.nrows(), 12);
+        self.w_from_t_into(commands, &mut poses);
+        poses
+    }
+
+    /// As [`Batch::w_from_t`], into a matrix of that size.
+    ///
+    /// # Panics
+    /// As [`Batch::w_from_t`], and if the matrix has another size.
+    pub fn w_from_t_into(&self, commands: &DMatrix<f64>, poses: &mut DMatrix<f64>) {
+        self.walk(commands, poses, 12, Want::Poses);
+    }
+
+    /// The length of a bar from the point `workpiece_point_w` to the point `tool_point_t`, m, and behind it its row over all deviations, six
+    /// columns for each dyad in the machine's order, `docs/model.md` (14), (16): derivatives by increments behind `exp(dh)`, m/m and m/rad.
+    ///
+    /// # Panics
+    /// As [`Batch::w_from_t`], and if the matrix has another size.
+    pub fn distance_rows_into(
+        &self,
+        commands: &DMatrix<f64>,
+        workpiece_point_w: Vec3<f64>,
+        tool_point_t: Vec3<f64>,
+        rows: &mut DMatrix<f64>,
+    ) {
+        let width = 1 + 6 * self.path.dyad_count();
+        self.walk(commands, rows, width, Want::Distances { workpiece_point_w, tool_point_t });
+    }
+
+    /// Velocity of the point `tool_point_t` and angular velocity of the tool, both seen from `w`, by the speed of each command: six columns
+    /// `vx vy vz wx wy wz` for each, `docs/model.md` (13).
+    ///
+    /// # Panics
+    /// As [`Batch::w_from_t`], and if the matrix has another size.
+    pub fn velocities_into(
+        &self,
+        commands: &DMatrix<f64>,
+        tool_point_t: Vec3<f64>,
+        velocities: &mut DMatrix<f64>,
+    ) {
+        self.walk(commands, velocities, 6 * commands.ncols(), Want::Velocities { tool_point_t });
+    }
+
+    fn walk(&self, commands: &DMatrix<f64>, results: &mut DMatrix<f64>, width: usize, want: Want) {
+        let samples = commands.nrows();
+        assert_eq!(results.shape(), (samples, width), "samples and columns of the results");
+        if samples >= MOST_LANES {
+            Arch::new().dispatch(Walk { path: &self.path, commands, results, want });
+        } else if samples > 0 {
+            // Fewer than the lanes: the last sample once more.
+            let last = |k: usize| k.min(samples - 1);
+            let more = DMatrix::from_fn(MOST_LANES, commands.ncols(), |k, c| commands[(last(k), c)]);
+            let mut wider = DMatrix::zeros(MOST_LANES, width);
+            Arch::new().dispatch(Walk { path: &self.path, commands: &more, results: &mut wider, want });
+            results.copy_from(&wider.rows(0, samples));
+        }
+    }
+}
+
+/// What is computed at each sample.
+#[derive(Clone, Copy)]
+enum Want {
+    Poses,
+    Distances { workpiece_point_w: Vec3<f64>, tool_point_t: Vec3<f64> },
+    Velocities { tool_point_t: Vec3<f64> },
+}
+
+/// At least as many samples as there are lanes.
+struct Walk<'a> {
+    path: &'a Path,
+    commands: &'a DMatrix<f64>,
+    results: &'a mut DMatrix<f64>,
+    want: Want,
+}
+
+impl WithSimd for Walk<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (samples, none) = (self.commands.nrows(), Lanes::splat(simd, 0.0));
+        let (commands, results) = (self.commands.as_slice(), self.results.as_mut_slice());
+        let mut q = vec![none; self.commands.ncols()];
+        let mut moved = vec![Moved::none(none); self.path.joint_count().max(1)];
+        let mut velocities = vec![Twist::zero(none); self.path.joint_count()];
+        let mut by_command = vec![Twist::zero(none); q.len()];
+        let mut row = vec![none; results.len() / samples];
+        let mut from = 0;
+        while from < samples {
+            // The last samples are those of full lanes, some of them once more.
+            let k = from.min(samples - S::F64_LANES);
+            let mut at = k;
+            for q in &mut q {
+                *q = Lanes::load(simd, &commands[at..at + S::F64_LANES]);
+                at += samples;
+            }
+            self.path.go_to(&q, &mut moved);
+            match self.want {
+                Want::Poses => {
+                    let pose = self.path.w_from_t(&moved, none);
+                    let ([x, y, z], [px, py, pz]) = (pose.rotation.0, pose.translation.0);
+                    row.copy_from_slice(&[x[0], x[1], x[2], px, y[0], y[1], y[2], py, z[0], z[1], z[2], pz]);
+                }
+                Want::Distances { workpiece_point_w, tool_point_t } => {
+                    let p_w = self.path.point_w(tool_point_t.lift(none), &moved);
+                    let bar = p_w - workpiece_point_w.lift(none);
+                    row[0] = bar.norm();
+                    let along_w = bar.times(row[0].recip());
+                    self.path.row(Wrench::at_point(along_w, p_w), &moved, &mut row[1..]);
+                }
+                Want::Velocities { tool_point_t } => {
+                    self.path.velocities(tool_point_t.lift(none), &moved, &mut velocities);
+                    by_command.fill(Twist::zero(none));
+                    self.path.by_command(&velocities, &mut by_command);
+                    for (twist, row) in by_command.iter().zip(row.chunks_exact_mut(6)) {
+                        row.copy_from_slice(&twist.to_array());
+                    }
+                }
+            }
+            let mut at = k;
+            for value in &row {
+                value.store(&mut results[at..at + S::F64_LANES]);
+                at += samples;
+            }
+            from += S::F64_LANES;
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! Sums over samples of a [`Gauge`], block by block on SIMD lanes, `docs/model.md` (20).
+
+use nalgebra::{DMatrix, DVector};
+use pulp::{Arch, Simd, WithSimd};
+
+use super::gauge::Gauge;
+use super::loss::Loss;
+use super::normal::{COUNTS, Tally};
+use super::stretch::Stretch;
+use crate::chain::Moved;
+use crate::scalar::{Lanes, MOST_LANES, Scalar};
+use crate::sensor::MOST_READINGS;
+use crate::units::Quantity;
+
+/// Samples of a block: its columns stay in a core's nearest cache.
+const SAMPLES: usize = 96;
+/// Columns that are multiplied with as many others at a time: the sums of such a tile are all in registers.
+const TILE: usize = 3;
+
+/// Some samples of a stretch, read by a gauge.
+#[derive(Clone, Copy)]
+pub(crate) struct Samples<'a> {
+    pub gauge: &'a Gauge<'a>,
+    pub stretch: &'a Stretch,
+    /// Which samples.
+    pub members: &'a [usize],
+}
+
+/// Samples and how they are judged.
+pub(crate) struct Block<'a> {
+    pub samples: Samples<'a>,
+    pub sigmas: &'a [f64],
+    pub loss: Loss,
+    /// Columns of a row over which sums are taken.
+    pub columns: &'a [usize],
+}
+
+/// What a [`Block`] adds.
+pub(crate) struct Sum {
+    pub matrix: DMatrix<f64>,
+    pub gradient: DVector<f64>,
+    pub loss: f64,
+    pub tally: Tally,
+}
+
+impl Samples<'_> {
+    /// The residuals, measured minus model, m: those of a sample one after the other.
+    pub fn residuals(self) -> Vec<f64> {
+        Arch::new().dispatch(self)
+    }
+
+    /// From sample `from` on, one column a slot: of rows of so many numbers, those of one place. Lanes behind the last sample repeat it.
+    #[inline(always)]
+    fn columns<S: Simd>(&self, simd: S, from: usize, rows: &[f64], to: &mut [Lanes<S>]) {
+        let (width, last) = (to.len(), self.members.len() - 1);
+        let mut at = [0; MOST_LANES];
+        for (l, at) in at[..S::F64_LANES].iter_mut().enumerate() {
+            *at = width * self.members[(from + l).min(last)];
+        }
+        for (c, to) in to.iter_mut().enumerate() {
+            let mut lanes = [0.0; MOST_LANES];
+            for (lane, at) in lanes[..S::F64_LANES].iter_mut().zip(at) {
+                *lane = rows[at + c];
+            }
+            *to = Lanes::load(simd, &lanes[..S::F64_LANES]);
+        }
+    }
+}
+
+impl WithSimd for Samples<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<f64> {
+        let none = Lanes::splat(simd, 0.0);
+        let (count, gauge) = (self.gauge.reading_count(), self.gauge);
+        let mut residuals = vec![0.0; self.members.len() * count];
+        let mut q = vec![none; self.stretch.commands];
+        let mut moved = vec![Moved::none(none); gauge.joint_count().max(1)];
+        let mut measured = [none; MOST_READINGS];
+        let state = gauge.state(none);
+        let mut lanes = [0.0; MOST_LANES];
+        for (group, residuals) in residuals.chunks_mut(count * S::F64_LANES).enumerate() {
+            self.columns(simd, group * S::F64_LANES, &self.stretch.chunk.commands, &mut q);
+            self.columns(simd, group * S::F64_LANES, &self.stretch.chunk.values, &mut measured[..count]);
+            let p_w = gauge.go_to(&q, &state, &mut moved);
+            for i in 0..count {
+                (measured[i] - gauge.reading(i, p_w, &state).0).store(&mut lanes[..S::F64_LANES]);
+                for (residuals, lane) in residuals.chunks_exact_mut(count).zip(lanes) {
+                    residuals[i] = lane;
+                }
+            }
+        }
+        residuals
+    }
+}
+
+impl Block<'_> {
+    /// Takes the sums.
+    pub fn sum(self) -> Sum {
+        Arch::new().dispatch(self)
+    }
+
+    /// Judges the residuals of the lanes from sample `from` on, in standard deviations, one by one: counts them, and returns by what rows
+    /// and residuals of each lane are multiplied.
+    fn judge(
+        &self,
+        from: usize,
+        lanes: usize,
+        readings: &[[f64; MOST_LANES]],
+        sum: &mut Sum,
+    ) -> [f64; MOST_LANES] {
+        let mut factors = [0.0; MOST_LANES];
+        let open = self.samples.members.len() - from;
+        for (l, factor) in factors[..lanes.min(open)].iter_mut().enumerate() {
+            let squares: f64 = readings.iter().map(|reading| reading[l] * reading[l]).sum();
+            let (rho, weight) = self.loss.at(squares / readings.len() as f64);
+            sum.loss += readings.len() as f64 * rho;
+            sum.tally.down_weighted += u64::from(weight < 0.5);
+            let sums = &mut sum.tally.residuals[Quantity::Length];
+            for (reading, sigma) in readings.iter().zip(self.sigmas) {
+                let own = (reading[l] * sigma) * (reading[l] * sigma);
+                sums.rows += 1;
+                sums.squares += own;
+                if weight > COUNTS {
+                    sums.inliers += 1;
+                    sums.inlier_squares += own;
+                }
+            }
+            *factor = weight.sqrt();
+        }
+        factors
+    }
+}
+
+impl WithSimd for Block<'_> {
+    type Output = Sum;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Sum {
+        let none = Lanes::splat(simd, 0.0);
+        let Samples { gauge, stretch, members } = self.samples;
+        let (count, width) = (gauge.reading_count(), self.columns.len() + 1);
+        let (tiles, depth) = (width.div_ceil(TILE), SAMPLES / S::F64_LANES * count);
+        let mut sum = Sum {
+            matrix: DMatrix::zeros(width - 1, width - 1),
+            gradient: DVector::zeros(width - 1),
+            loss: 0.0,
+            tally: Tally { samples: members.len() as u64, ..Tally::default() },
+        };
+        // Row by row of lanes; the last column that counts is that of the residuals.
+        let mut rows = vec![[none; TILE]; depth * tiles];
+        let mut squares = vec![[[none; TILE]; TILE]; tiles * (tiles + 1) / 2];
+        let mut q = vec![none; stretch.commands];
+        let mut moved = vec![Moved::none(none); gauge.joint_count().max(1)];
+        let mut row = vec![none; gauge.width()];
+        let (mut measured, mut standardised) = ([none; MOST_READINGS], [none; MOST_READINGS]);
+        // What is plain is summed over lanes: squared standardised readings, by reading.
+        let (mut plain, mut plain_groups) = ([none; MOST_READINGS], 0u64);
+        let state = gauge.state(none);
+        let mut factors = [1.0; MOST_READINGS];
+        for (factor, sigma) in factors.iter_mut().zip(self.sigmas) {
+            *factor = sigma.recip();
+        }
+        // Up to here the loss is half of the square, summed over the readings of a sample.
+        let plain_below = count as f64 * self.loss.plain_below();
+        for from in (0..members.len()).step_by(SAMPLES) {
+            let filled = (members.len() - from).min(SAMPLES).div_ceil(S::F64_LANES);
+            for group in 0..filled {
+                let first = from + group * S::F64_LANES;
+                self.samples.columns(simd, first, &stretch.chunk.commands, &mut q);
+                self.samples.columns(simd, first, &stretch.chunk.values, &mut measured[..count]);
+                let p_w = gauge.go_to(&q, &state, &mut moved);
+                let mut square = none;
+                for i in 0..count {
+                    let (value, n_w) = gauge.reading(i, p_w, &state);
+                    standardised[i] = (measured[i] - value).scale(factors[i]);
+                    square = standardised[i].mul_add(standardised[i], square);
+                    gauge.row(n_w, p_w, factors[i], &moved, &mut row);
+                    let own = rows[(group * count + i) * tiles..][..tiles].as_flattened_mut();
+                    for (column, number) in own.iter_mut().zip(self.columns) {
+                        *column = row[*number];
+                    }
+                    own[width - 1] = standardised[i];
+                }
+                if first + S::F64_LANES <= members.len() && square.all_below(plain_below) {
+                    plain_groups += 1;
+                    for (sum, own) in plain.iter_mut().zip(standardised) {
+                        *sum = own.mul_add(own, *sum);
+                    }
+                    continue;
+                }
+                let mut readings = [[0.0; MOST_LANES]; MOST_READINGS];
+                for (lanes, reading) in standardised.iter().zip(&mut readings) {
+                    lanes.store(&mut reading[..S::F64_LANES]);
+                }
+                let factors = self.judge(first, S::F64_LANES, &readings[..count], &mut sum);
+                let factor = Lanes::load(simd, &factors[..S::F64_LANES]);
+                for number in rows[group * count * tiles..][..count * tiles].as_flattened_mut() {
+                    *number = *number * factor;
+                }
+            }
+            add_squares(&rows[..filled * count * tiles], tiles, &mut squares);
+        }
+        let sums = &mut sum.tally.residuals[Quantity::Length];
+        sums.rows += plain_groups * (S::F64_LANES * count) as u64;
+        sums.inliers += plain_groups * (S::F64_LANES * count) as u64;
+        for (squares, sigma) in plain.iter().zip(self.sigmas) {
+            sum.loss += 0.5 * squares.sum();
+            sums.squares += squares.sum() * sigma * sigma;
+            sums.inlier_squares += squares.sum() * sigma * sigma;
+        }
+        let mut tile = 0;
+        for a in 0..tiles {
+            for b in 0..=a {
+                for (i, row) in squares[tile].iter().enumerate() {
+                    for (j, lanes) in row.iter().enumerate() {
+                        let (i, j, number) = (TILE * a + i, TILE * b + j, lanes.sum());
+                        if i + 1 < width && j + 1 < width {
+                            sum.matrix[(i, j)] = number;
+                            sum.matrix[(j, i)] = number;
+                        } else if i + 1 == width && j + 1 < width {
+                            sum.gradient[j] = number;
+                        }
+                    }
+                }
+                tile += 1;
+            }
+        }
+        sum
+    }
+}
+
+/// Adds the products of all columns, tile by tile on and below the diagonal.
+#[inline(always)]
+fn add_squares<S: Simd>(rows: &[[Lanes<S>; TILE]], tiles: usize, squares: &mut [[[Lanes<S>; TILE]; TILE]]) {
+    let mut squares = squares.iter_mut();
+    for a in 0..tiles {
+        for b in 0..=a {
+            let Some(square) = squares.next() else { return };
+            let [[mut s00, mut s01, mut s02], [mut s10, mut s11, mut s12], [mut s20, mut s21, mut s22]] =
+                *square;
+            for row in rows.chunks_exact(tiles) {
+                let ([x0, x1, x2], [y0, y1, y2]) = (row[a], row[b]);
+                (s00, s01, s02) = (x0.mul_add(y0, s00), x0.mul_add(y1, s01), x0.mul_add(y2, s02));
+                (s10, s11, s12) = (x1.mul_add(y0, s10), x1.mul_add(y1, s11), x1.mul_add(y2, s12));
+                (s20, s21, s22) = (x2.mul_add(y0, s20), x2.mul_add(y1, s21), x2.mul_add(y2, s22));
+            }
+            *square = [[s00, s01, s02], [s10, s11, s12], [s20, s21, s22]];
+        }
+    }
+}
