@@ -9,8 +9,10 @@ mod describe;
 mod diagnose;
 mod failure;
 mod files;
+mod import;
 mod join;
 mod location;
+mod machines;
 mod output;
 mod part;
 mod predict;
@@ -57,6 +59,10 @@ enum Command {
     Verify(verify::Args),
     /// Recordings of a machine whose errors are known: standard tests, random poses, NC programs
     Simulate(Box<simulate::Args>),
+    /// A machine file from a URDF file
+    Import(import::Args),
+    /// The machines that come with the program, or the file of one of them
+    Machines(machines::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
     Demo(demo::Args),
 }
@@ -110,6 +116,8 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Compensate(args) => compensate::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Simulate(args) => simulate::run(args, files),
+        Command::Import(args) => import::run(args),
+        Command::Machines(args) => machines::run(args),
         Command::Demo(args) => demo::run(args),
     }
 }

@@ -50,6 +50,7 @@
 //! | `nc` | NC programs: blocks, words, modal state; written back byte for byte |
 //! | [`compensate`](mod@compensate) | NC programs rewritten so that the actual machine cuts what they mean |
 //! | [`simulate`] | recordings of machines whose errors are known: faults, tests, instruments |
+//! | [`import`](mod@import) | machines from URDF (feature `import`) |
 //! | `demo` | the reference machine, a simulated recording, and what a diagnosis says of it |
 //! | `cli` | the command line, a thin face over all of it (feature `cli`) |
 //!
@@ -133,6 +134,8 @@ mod feature;
 #[doc(hidden)]
 pub mod feature;
 pub mod identify;
+#[cfg(feature = "import")]
+pub mod import;
 pub mod inverse;
 pub mod lie;
 pub mod location;

@@ -14,6 +14,7 @@ mod documents;
 mod files;
 mod interrupted;
 mod loads;
+mod machines_in;
 mod outputs;
 mod program;
 mod simulate;

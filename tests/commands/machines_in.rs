@@ -1,0 +1,42 @@
+//! Machines that come in: imported ones, and those that the program carries.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::program::{Folder, done, fails};
+
+#[test]
+fn every_file_in_machines_is_carried_by_the_program_as_it_is() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("machines");
+    let listed: Vec<Value> =
+        serde_json::from_str(&done(&["machines", "--json", "-"])).expect("a list in JSON");
+    let listed: Vec<&str> = listed.iter().map(|m| m["machine"].as_str().expect("a name")).collect();
+    let mut there = Vec::new();
+    for entry in std::fs::read_dir(&folder).expect("a folder") {
+        let path = entry.expect("readable").path();
+        let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+        assert_eq!(done(&["machines", &name]), std::fs::read_to_string(&path).expect("a text"), "{name}");
+        there.push(name);
+    }
+    there.sort();
+    assert_eq!(listed, there);
+}
+
+#[test]
+fn a_machine_that_does_not_come_with_the_program_is_told() {
+    let said = fails(1, &["machines", "ac_tabel"]);
+    assert!(said.contains("\"ac_tabel\"") && said.contains("`kincal machines` lists them"), "{said}");
+}
+
+#[test]
+fn an_imported_file_is_a_machine_that_every_command_takes() {
+    let folder = Folder::new("import");
+    let ron = folder.path("arm.ron");
+    let said = done(&["import", "tests/urdf/arm.urdf", "--tip", "finger", "-o", &ron]);
+    assert!(said.contains("joint \"lift/1\" is called lift_1") && said.contains("written to"), "{said}");
+    assert!(done(&["describe", &ron, "--at", "elbow=10deg"]).contains("elbow=10deg"));
+    let said = fails(1, &["import", "tests/urdf/arm.urdf", "--tip", "toe", "-o", &folder.path("toe.ron")]);
+    assert!(said.contains("--tip toe") && said.contains("finger"), "{said}");
+    assert!(!Path::new(&folder.path("toe.ron")).exists());
+}
