@@ -25,6 +25,7 @@ mod settle;
 mod solve;
 mod source;
 mod stretch;
+mod tally;
 mod thin;
 mod unknowns;
 mod unseen;

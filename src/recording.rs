@@ -51,7 +51,7 @@ use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
 use column::Layout;
 use header::Draft;
-use kept::Kept;
+use kept::{Keeping, Kept};
 use lines::{LONGEST, Lines, Stop};
 use reader::Pass;
 use text::Fail;
@@ -260,8 +260,9 @@ impl Recording {
         if let Some(kept) = self.kept.get() {
             return Ok(kept.summary.clone());
         }
-        let kept = summary::scan(self)?;
-        Ok(self.kept.get_or_init(|| kept).summary.clone())
+        let mut keeping = Keeping::default();
+        let summary = summary::scan(self, |chunk| keeping.take(chunk))?;
+        Ok(self.kept.get_or_init(|| keeping.with(summary)).summary.clone())
     }
 
     /// Lines behind the header row.

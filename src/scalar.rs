@@ -85,7 +85,7 @@ impl Scalar for f64 {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        elementary::sine_cosine(self)
+        f64::sin_cos(self)
     }
     #[inline(always)]
     fn exp(self) -> Self {

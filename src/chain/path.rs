@@ -92,7 +92,7 @@ impl Path {
             if let Some((number, axis)) = joint {
                 let back = !on_tool;
                 if path.joints[number].is_turn {
-                    let aligned = Pose { rotation: axis.from_z(), translation: Vec3::zero(0.0) };
+                    let aligned = Pose { rotation: axis.turned_z(), translation: Vec3::zero(0.0) };
                     open.go_on(aligned);
                     open.turn = Some(Turn { joint: number, back });
                     path.spans.push(std::mem::replace(&mut open, Span::new(aligned.inverse())));
@@ -310,7 +310,7 @@ impl Axis {
     }
 
     /// A rotation that takes z to this axis.
-    fn from_z(self) -> Mat3<f64> {
+    fn turned_z(self) -> Mat3<f64> {
         let z = self.vector();
         let [x, _] = z.across();
         Mat3([x.0, z.cross(x).0, z.0]).transpose()

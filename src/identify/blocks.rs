@@ -5,8 +5,8 @@ use pulp::{Arch, Simd, WithSimd};
 
 use super::gauge::Gauge;
 use super::loss::Loss;
-use super::normal::{COUNTS, Tally};
 use super::stretch::Stretch;
+use super::tally::{COUNTS, Tally};
 use crate::chain::Moved;
 use crate::scalar::{Lanes, MOST_LANES, Scalar};
 use crate::sensor::MOST_READINGS;

@@ -6,11 +6,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::evaluator::{Evaluator, Moment};
 use super::judge::{Figures, PieceFit, judge};
-use super::normal::{Tally, matrix_in_general, rms_over, sigmas, standardised};
+use super::normal::{matrix_in_general, rms_over, sigmas, standardised};
 use super::plausible::{Plausibility, plausibility};
 use super::solve::Problem;
 use super::source::{Known, Which};
 use super::stretch::Stretch;
+use super::tally::Tally;
 use super::unknowns::{Block, Role, Unknowns};
 use super::warnings::warnings;
 use super::{CalibrateOptions, Found, Information, Loss, Solver, Stop};

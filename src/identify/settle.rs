@@ -2,10 +2,11 @@
 
 use super::Info;
 use super::noise::{Noise, with_stated};
-use super::normal::{self, Normal, Sums, Tally};
+use super::normal::{self, Normal};
 use super::plausible;
 use super::solve::{Problem, Solution, Solver};
 use super::source;
+use super::tally::{Sums, Tally};
 use super::thin;
 use super::unknowns::Unknowns;
 use crate::error::Result;
@@ -57,7 +58,7 @@ pub(super) fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: 
         // The named rivals regularise by their number of steps, so they always start afresh.
         let from = if solver.uses_prior() { solution.unknowns.clone() } else { start.clone() };
         solution = problem.solve(solver, from, &noise)?;
-        steps += solution.steps;
+        steps = if solver.uses_prior() { steps + solution.steps } else { solution.steps };
     }
     solution.steps = steps;
     Ok(Found { solution, noise, seen })

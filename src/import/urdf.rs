@@ -157,7 +157,7 @@ fn mass(source: &Source, link: Node, name: &str, told: &mut Vec<String>) -> Opti
     };
     match read() {
         Ok((kg, centre)) if kg > 0.0 => Some((kg, Vec3(centre))),
-        Ok((kg, _)) if kg == 0.0 => None,
+        Ok((0.0, _)) => None,
         _ => {
             let line = source.line(inertial);
             told.push(format!(

@@ -2,7 +2,6 @@
 
 use super::Recording;
 use super::column::Role;
-use super::kept::{Keeping, Kept};
 use super::reader::{Chunk, Pass};
 use super::text::Fail;
 use super::{RecordingFault as Fault, entry};
@@ -89,12 +88,12 @@ impl Steps {
     }
 }
 
-pub(super) fn scan(recording: &Recording) -> Result<Kept> {
+/// Every chunk goes to `take`.
+pub(super) fn scan(recording: &Recording, mut take: impl FnMut(Chunk)) -> Result<Summary> {
     let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.fixed.len()];
     let (mut samples, mut dropped) = (0, 0);
     let (mut time, mut steps) = (None, Steps::new());
     let mut longest = (0.0, 0);
-    let mut keeping = Keeping::default();
     let mut chunks = Pass::start(recording)?.read();
     for chunk in &mut chunks {
         let chunk = chunk?;
@@ -116,7 +115,7 @@ pub(super) fn scan(recording: &Recording) -> Result<Kept> {
             }
             time = Some((first, t));
         }
-        keeping.take(chunk);
+        take(chunk);
     }
     let pass = chunks.pass;
     if pass.rows == 0 {
@@ -146,7 +145,7 @@ pub(super) fn scan(recording: &Recording) -> Result<Kept> {
     if pauses > 0 && samples >= STEADY {
         warn_of_jump(longest, time, &mut warnings);
     }
-    Ok(keeping.with(Summary {
+    Ok(Summary {
         rows: pass.rows,
         samples,
         dropped,
@@ -157,7 +156,7 @@ pub(super) fn scan(recording: &Recording) -> Result<Kept> {
         pause_after,
         pauses,
         warnings,
-    }))
+    })
 }
 
 /// A pause longer than all the rest of the recording may be none: whatever drifts with time hangs on it alone.

@@ -22,7 +22,7 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 11] = [
+const TABLE: [Row; 13] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--json"]),
@@ -48,6 +48,8 @@ const TABLE: [Row; 11] = [
         &["MACHINE.ron", "--input", "--faults"],
         &["--output", "--nc", "--truth", "--json"],
     ),
+    row("import", &[], &["ROBOT.urdf"], &["--output", "--json"]),
+    row("machines", &[], &[], &["--json"]),
     row("demo", &[], &[], &["--report", "--json"]),
 ];
 
@@ -63,8 +65,8 @@ impl Row {
             command.args([name, path]);
         }
         // What a command cannot do without.
-        if ["join", "simulate"].contains(&self.command) && written.iter().all(|(name, _)| *name != "--output")
-        {
+        let needs_output = ["join", "simulate", "import"].contains(&self.command);
+        if needs_output && written.iter().all(|(name, _)| *name != "--output") {
             command.args(["--output", "elsewhere"]);
         }
         let output = command.output().expect("it runs");
@@ -153,7 +155,8 @@ fn no_two_outputs_have_one_name() {
 fn files_in_help(command: &str) -> Vec<String> {
     let help = crate::program::done(&[command, "--help"]);
     let is_file = |name: &str| {
-        [".ron", ".csv", ".nc", ".html"].iter().any(|end| name.ends_with(end)) || name.starts_with("FILE")
+        [".ron", ".csv", ".nc", ".html", ".urdf"].iter().any(|end| name.ends_with(end))
+            || name.starts_with("FILE")
     };
     let mut found: Vec<String> = Vec::new();
     for line in help.lines().map(str::trim_start).filter(|line| line.starts_with(['-', '<', '['])) {
