@@ -56,8 +56,8 @@ impl Folder {
         let poses = self.poses("arm_true");
         let mut chain = Chain::nominal(machine);
         chain.set_previous_from_frame(1, poses[0] * poses[1]);
-        for k in 2..8 {
-            chain.set_previous_from_frame(k, poses[k]);
+        for (frame, pose) in poses.iter().enumerate().skip(2) {
+            chain.set_previous_from_frame(frame, *pose);
         }
         chain
     }

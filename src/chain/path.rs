@@ -52,6 +52,8 @@ struct Step {
     /// it in this frame on the workpiece's.
     here_from_next: Pose<f64>,
     joint: Option<(usize, Axis)>,
+    /// What comes behind the joint on the same way, where something is carried there.
+    carried: Option<Pose<f64>>,
 }
 
 /// The axis of a joint; along a coordinate axis it takes a third of the work.
@@ -84,10 +86,12 @@ impl Path {
                 path.joints.push(Joint { is_turn: *kind == JointKind::Revolute, terms });
                 (path.joints.len() - 1, axis)
             });
-            let here_from_next =
-                if on_tool { link.previous_from_frame } else { link.previous_from_frame.inverse() };
+            let passed = |pose: Pose<f64>| if on_tool { pose } else { pose.inverse() };
+            let (here_from_next, carried) = (passed(link.previous_from_frame), link.carried.map(passed));
             if on_tool {
                 open.go_on(here_from_next);
+            } else if let Some(carried) = carried {
+                open.go_on(carried);
             }
             if let Some((number, axis)) = joint {
                 let back = !on_tool;
@@ -103,8 +107,10 @@ impl Path {
             }
             if !on_tool {
                 open.go_on(here_from_next);
+            } else if let Some(carried) = carried {
+                open.go_on(carried);
             }
-            path.steps.push(Step { dyad: j, on_tool, here_from_next, joint });
+            path.steps.push(Step { dyad: j, on_tool, here_from_next, joint, carried });
         }
         path.spans.push(open);
         path
@@ -226,23 +232,38 @@ impl Path {
             if step.on_tool {
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
                 row[6 * step.dyad..6 * step.dyad + 6].copy_from_slice(&y.to_array());
-                if let Some((joint, axis)) = step.joint {
-                    y = axis.carry(y, moved[joint], self.joints[joint].is_turn);
-                }
+                y = self.through(step, y, moved);
+                y = step.behind(y);
             } else {
-                if let Some((joint, axis)) = step.joint {
-                    y = axis.carry(
-                        y,
-                        moved[joint].back(self.joints[joint].is_turn),
-                        self.joints[joint].is_turn,
-                    );
-                }
+                y = step.behind(y);
+                y = self.through(step, y, moved);
                 let against = Wrench { f: -y.f, m: -y.m };
                 row[6 * step.dyad..6 * step.dyad + 6].copy_from_slice(&against.to_array());
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
             }
         }
         y
+    }
+}
+
+impl Path {
+    /// A wrench in front of a dyad's joint on the way, as it is seen behind it.
+    #[inline(always)]
+    fn through<T: Scalar>(&self, step: &Step, y: Wrench<T>, moved: &[Moved<T>]) -> Wrench<T> {
+        let Some((joint, axis)) = step.joint else { return y };
+        let (is_turn, moved) = (self.joints[joint].is_turn, moved[joint]);
+        axis.carry(y, if step.on_tool { moved } else { moved.back(is_turn) }, is_turn)
+    }
+}
+
+impl Step {
+    /// A wrench in front of what the joint carries on the way, as it is seen behind that.
+    #[inline(always)]
+    fn behind<T: Scalar>(&self, y: Wrench<T>) -> Wrench<T> {
+        match self.carried {
+            Some(carried) => carried.lift(y.f.0[0]).carry_wrench(y),
+            None => y,
+        }
     }
 }
 

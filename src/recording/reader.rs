@@ -62,16 +62,16 @@ impl Chunk {
 }
 
 /// Samples of one pass, in chunks; see [`Recording::chunks`].
-pub struct Chunks<'a>(From<'a>);
+pub struct Chunks<'a>(Origin<'a>);
 
-enum From<'a> {
+enum Origin<'a> {
     Memory(std::slice::Iter<'a, Arc<Chunk>>),
     File(Box<Read<'a>>),
 }
 
 impl<'a> Chunks<'a> {
     pub(super) fn kept(chunks: &'a [Arc<Chunk>]) -> Self {
-        Chunks(From::Memory(chunks.iter()))
+        Chunks(Origin::Memory(chunks.iter()))
     }
 }
 
@@ -80,8 +80,8 @@ impl Iterator for Chunks<'_> {
 
     fn next(&mut self) -> Option<Self::Item> {
         match &mut self.0 {
-            From::Memory(chunks) => chunks.next().map(|chunk| Ok(Chunk::clone(chunk))),
-            From::File(read) => read.next(),
+            Origin::Memory(chunks) => chunks.next().map(|chunk| Ok(Chunk::clone(chunk))),
+            Origin::File(read) => read.next(),
         }
     }
 }
@@ -230,7 +230,7 @@ impl<'a> Pass<'a> {
     }
 
     pub fn chunks(self) -> Chunks<'a> {
-        Chunks(From::File(Box::new(self.read())))
+        Chunks(Origin::File(Box::new(self.read())))
     }
 
     pub fn read(self) -> Read<'a> {

@@ -4,16 +4,20 @@ use crate::common;
 use crate::common::random::Random;
 use kincal::Machine;
 use kincal::chain::{Batch, Chain};
-use kincal::lie::{Twist, Vec3, Wrench};
+use kincal::lie::{Pose, Twist, Vec3, Wrench};
 use kincal::nalgebra::DMatrix;
 
-/// A machine with deviations, and commands within a turn or a metre.
+/// A machine with deviations in front of its joints and behind some, and commands within a turn or a metre.
 fn drawn(machine: &Machine, samples: usize, seed: u64) -> (Chain<f64>, DMatrix<f64>) {
     let mut random = Random::new(seed);
     let mut twist = || Twist::from_array(std::array::from_fn(|_| random.between(-0.02, 0.02)));
     let deviations: Vec<Twist<f64>> = machine.dyads().iter().map(|_| twist()).collect();
+    let mut chain = Chain::new(machine, &deviations);
+    for j in (0..machine.dyads().len()).step_by(2) {
+        chain.set_carried(j, Pose::exp(twist()));
+    }
     let commands = DMatrix::from_fn(samples, machine.commands().len(), |_, _| random.between(-4.0, 4.0));
-    (Chain::new(machine, &deviations), commands)
+    (chain, commands)
 }
 
 /// Fewer samples than lanes, full lanes, and some beyond.
