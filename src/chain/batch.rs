@@ -8,7 +8,7 @@ use crate::lie::{Twist, Vec3, Wrench};
 use crate::scalar::{Lanes, MOST_LANES, Scalar};
 
 /// A chain that is laid out for many samples, which are computed as many at a time as the machine has SIMD lanes. Commands and results
-/// are matrices with one row for each sample.
+/// are matrices with one row for each sample. Turns beyond 2e9 rad give no numbers (NaN).
 ///
 /// ```
 /// use kincal::chain::{Batch, Chain};
