@@ -120,13 +120,7 @@ impl<S: Scalar> Chain<S> {
             }
             let b_from_frame = behind * link.previous_from_frame;
             sweep.b_from_frame.push(b_from_frame);
-            behind = match &link.joint {
-                None => b_from_frame,
-                Some((kind, axis, drive)) => b_from_frame * joint_pose(*kind, *axis, displacement(drive, q)),
-            };
-            if let Some(carried) = link.carried {
-                behind = behind * carried;
-            }
+            behind = link.behind(b_from_frame, q);
             sweep.b_from_carried.push(behind);
         }
         sweep.b_from_t = behind;
@@ -134,7 +128,25 @@ impl<S: Scalar> Chain<S> {
 
     /// `w_from_t` at the commands `q`, `docs/model.md` (10).
     pub fn w_from_t(&self, q: &[S]) -> Pose<S> {
-        self.sweep(q).w_from_t()
+        let (workpiece, tool) = self.links.split_at(self.workpiece_count);
+        let end = |links: &[Link<S>]| {
+            links
+                .iter()
+                .fold(Pose::identity(q[0]), |behind, link| link.behind(behind * link.previous_from_frame, q))
+        };
+        end(workpiece).inverse() * end(tool)
+    }
+}
+
+impl<S: Scalar> Link<S> {
+    /// The pose behind the joint and what it carries, from that of the frame.
+    #[inline(always)]
+    fn behind(&self, b_from_frame: Pose<S>, q: &[S]) -> Pose<S> {
+        let behind = match &self.joint {
+            None => b_from_frame,
+            Some((kind, axis, drive)) => b_from_frame * joint_pose(*kind, *axis, displacement(drive, q)),
+        };
+        self.carried.map_or(behind, |carried| behind * carried)
     }
 }
 

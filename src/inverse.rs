@@ -5,9 +5,10 @@
 //! the joints hardly move the tool is held near the start instead of being chased, so that a correction stays
 //! small at a singular pose, and is told.
 
+mod directions;
+
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,7 @@ use crate::chain::{Chain, Sweep};
 use crate::check::random_command;
 use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{JointKind, Machine};
+use directions::{Direction, Equations, MOST, norm};
 
 /// What of the goal counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -163,47 +165,6 @@ struct Look {
     sweep: Sweep<f64>,
 }
 
-/// Directions of a task by how strongly the joints move them.
-struct Directions {
-    /// Left vectors (what moves), right vectors (with which joints), singular values.
-    parts: Vec<(DVector<f64>, DVector<f64>, f64)>,
-}
-
-impl Directions {
-    fn of(matrix: &DMatrix<f64>) -> Directions {
-        // Errors beyond all numbers, as a damaged file may state them, leave no direction: the goal is out of reach.
-        if matrix.is_empty() || !matrix.iter().all(|x| x.is_finite()) {
-            return Directions { parts: Vec::new() };
-        }
-        // Thin: as many as the smaller side has.
-        let svd = matrix.clone().svd(true, true);
-        let parts = match (&svd.u, &svd.v_t) {
-            (Some(u), Some(v_t)) => (0..svd.singular_values.len())
-                .map(|k| (u.column(k).into_owned(), v_t.row(k).transpose(), svd.singular_values[k]))
-                .collect(),
-            _ => Vec::new(),
-        };
-        Directions { parts }
-    }
-
-    fn largest(&self) -> f64 {
-        self.parts.iter().map(|(_, _, s)| *s).fold(0.0, f64::max)
-    }
-
-    /// (C3): along each direction the step that closes the error; a weak one is drawn back by `from_start`.
-    fn step(&self, error: &DVector<f64>, from_start: &DVector<f64>, weak: f64) -> DVector<f64> {
-        let mut step = DVector::zeros(from_start.len());
-        for (u, v, s) in &self.parts {
-            let hold = if *s < weak { 0.25 * weak * weak * (1.0 - (s / weak).powi(2)) } else { 0.0 };
-            let scale = s * s + hold;
-            if scale > 1e-24 {
-                step += v * ((s * u.dot(error) - hold * v.dot(from_start)) / scale);
-            }
-        }
-        step
-    }
-}
-
 fn unit(k: usize) -> Vec3<f64> {
     Vec3(std::array::from_fn(|i| if i == k { 1.0 } else { 0.0 }))
 }
@@ -278,24 +239,20 @@ impl<'a> Inverse<'a> {
         let count = self.machine.commands().len();
         let free = vec![true; count];
         let goal = Goal { t_from_tip: Pose::identity(0.0), w_from_tip: Pose::identity(0.0) };
-        let rank = |m: &DMatrix<f64>| {
-            let directions = Directions::of(m);
+        let rank = |equations: Equations| {
+            let directions = equations.directions();
             let largest = directions.largest();
-            directions.parts.iter().filter(|(_, _, s)| *s > 1e-6 * largest && *s > 1e-9).count()
+            directions.parts.iter().filter(|part| part.size > 1e-6 * largest && part.size > 1e-9).count()
         };
         let mut best = (0, 0, 0, false);
         for _ in 0..8 {
             let q: Vec<f64> = (0..count).map(|c| random_command(&self.machine, c, &mut rng)).collect();
             let look = self.look(&chain, &goal, &q);
             let (turns, shifts) = (self.turn_rows(&look, &free), self.shift_rows(&look, &free));
-            let mut all = DMatrix::zeros(turns.nrows() + 3, count);
-            all.rows_mut(0, 3).copy_from(&shifts);
-            all.rows_mut(3, turns.nrows()).copy_from(&turns);
-            let slides = self.only(&shifts, JointKind::Prismatic);
-            best.0 = best.0.max(rank(&all));
-            best.1 = best.1.max(rank(&turns));
-            best.2 = best.2.max(rank(&shifts));
-            best.3 |= rank(&slides) == 3;
+            best.3 |= rank(self.by_slides(&shifts)) == 3;
+            best.0 = best.0.max(rank(shifts.clone().and(&turns)));
+            best.1 = best.1.max(rank(turns));
+            best.2 = best.2.max(rank(shifts));
         }
         best
     }
@@ -327,44 +284,50 @@ impl<'a> Inverse<'a> {
         Look { tip, gap_w, turn_w, sweep }
     }
 
-    fn shift_rows(&self, look: &Look, free: &[bool]) -> DMatrix<f64> {
+    fn shift_rows(&self, look: &Look, free: &[bool]) -> Equations {
         let wrenches = [0, 1, 2].map(|k| Wrench::at_point(unit(k), look.tip.translation));
         self.rows(look, &wrenches, free)
     }
 
-    fn turn_rows(&self, look: &Look, free: &[bool]) -> DMatrix<f64> {
-        let directions = self.turn_directions(look);
-        self.rows(look, &directions.iter().map(|n| Wrench::couple(*n)).collect::<Vec<_>>(), free)
+    fn turn_rows(&self, look: &Look, free: &[bool]) -> Equations {
+        let (directions, count) = self.turn_directions(look);
+        self.rows(look, &directions.map(Wrench::couple)[..count], free)
     }
 
-    /// The turns that count, in `w`.
-    fn turn_directions(&self, look: &Look) -> Vec<Vec3<f64>> {
+    /// The turns that count, in `w`, and how many.
+    fn turn_directions(&self, look: &Look) -> ([Vec3<f64>; 3], usize) {
+        let axes = [0, 1, 2].map(unit);
         match self.mode {
-            Mode::Position => Vec::new(),
-            Mode::PositionAndAxis | Mode::Axis => square_to(look.tip.rotation.column(2)).to_vec(),
-            Mode::Pose => [0, 1, 2].map(unit).to_vec(),
-        }
-    }
-
-    fn rows(&self, look: &Look, wrenches: &[Wrench<f64>], free: &[bool]) -> DMatrix<f64> {
-        let mut matrix = DMatrix::zeros(wrenches.len(), free.len());
-        let mut row = vec![0.0; free.len()];
-        for (k, wrench) in wrenches.iter().enumerate() {
-            look.sweep.command_row(&self.machine, *wrench, &mut row);
-            for c in (0..free.len()).filter(|c| free[*c]) {
-                matrix[(k, c)] = row[c];
+            Mode::Position => (axes, 0),
+            Mode::PositionAndAxis | Mode::Axis => {
+                let [first, second] = square_to(look.tip.rotation.column(2));
+                ([first, second, axes[2]], 2)
             }
+            Mode::Pose => (axes, 3),
         }
-        matrix
     }
 
-    /// The columns of one kind of joint, the others zero.
-    fn only(&self, matrix: &DMatrix<f64>, kind: JointKind) -> DMatrix<f64> {
-        let mut part = matrix.clone();
-        for c in (0..part.ncols()).filter(|c| self.machine.command_joint(*c).kind != kind) {
-            part.column_mut(c).fill(0.0);
+    /// The turn that is missing, along the turns that count.
+    fn turn_left(&self, look: &Look) -> [f64; MOST] {
+        let (directions, count) = self.turn_directions(look);
+        let mut left = [0.0; MOST];
+        left.iter_mut().zip(&directions[..count]).for_each(|(left, n)| *left = n.dot(look.turn_w));
+        left
+    }
+
+    fn rows(&self, look: &Look, wrenches: &[Wrench<f64>], free: &[bool]) -> Equations {
+        let mut equations = Equations::new(wrenches.len(), free.len());
+        for (k, wrench) in wrenches.iter().enumerate() {
+            let row = equations.row_mut(k);
+            look.sweep.command_row(&self.machine, *wrench, row);
+            row.iter_mut().zip(free).filter(|(_, free)| !**free).for_each(|(x, _)| *x = 0.0);
         }
-        part
+        equations
+    }
+
+    /// What linear joints do.
+    fn by_slides(&self, equations: &Equations) -> Equations {
+        equations.only(|c| self.machine.command_joint(c).kind == JointKind::Prismatic)
     }
 
     /// Commands that bring the tip to the goal, or as near as the joints can.
@@ -429,22 +392,20 @@ impl<'a> Inverse<'a> {
             if close.0 < 1e-12 && close.1 < 1e-12 {
                 break;
             }
-            let mut step = self.step(&look, &q, start, free);
-            let longest = step.amax();
+            let step = self.step(&look, &q, start, free);
+            let longest = step.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
             if longest < 1e-11 {
                 break;
             }
             steps += 1;
-            if longest > 0.5 {
-                step *= 0.5 / longest;
-            }
+            let mut part = if longest > 0.5 { 0.5 / longest } else { 1.0 };
             let merit = |look: &Look| {
                 let (position, angle) = self.left(look);
                 position.hypot(angle)
             };
             let mut shortened = 0;
             loop {
-                let next: Vec<f64> = q.iter().zip(step.iter()).map(|(q, s)| q + s).collect();
+                let next: Vec<f64> = q.iter().zip(&step).map(|(q, s)| q + part * s).collect();
                 let there = self.look(chain, goal, &next);
                 // Far from the goal a full step may overshoot; near it, and where a weak direction is drawn
                 // back, it counts.
@@ -452,7 +413,7 @@ impl<'a> Inverse<'a> {
                     (q, look) = (next, there);
                     break;
                 }
-                step *= 0.5;
+                part *= 0.5;
                 shortened += 1;
             }
         }
@@ -469,96 +430,95 @@ impl<'a> Inverse<'a> {
     }
 
     /// (C2) to (C4).
-    fn step(&self, look: &Look, q: &[f64], start: &[f64], free: &[bool]) -> DVector<f64> {
-        let from_start = DVector::from_iterator(q.len(), q.iter().zip(start).map(|(q, s)| q - s));
+    fn step(&self, look: &Look, q: &[f64], start: &[f64], free: &[bool]) -> Vec<f64> {
+        let from_start: Vec<f64> = q.iter().zip(start).map(|(q, s)| q - s).collect();
         let weak = self.options.weak;
         let shifts = self.shift_rows(look, free);
-        let gap = DVector::from_column_slice(&look.gap_w.0);
-        let directions = self.turn_directions(look);
         let turns = self.turn_rows(look, free);
-        let turn = DVector::from_iterator(directions.len(), directions.iter().map(|n| n.dot(look.turn_w)));
+        let mut step = vec![0.0; q.len()];
         if self.mode == Mode::Pose && !self.by_slides {
-            // Arms: all six together, lengths against a lever of 1 m.
-            let mut all = DMatrix::zeros(6, q.len());
-            all.rows_mut(0, 3).copy_from(&shifts);
-            all.rows_mut(3, 3).copy_from(&turns);
-            let error = DVector::from_iterator(6, gap.iter().chain(turn.iter()).copied());
-            let directions = Directions::of(&all);
-            return directions.step(&error, &from_start, 0.05 * weak * directions.largest());
+            let directions = shifts.and(&turns).directions();
+            let weak = 0.05 * weak * directions.largest();
+            directions.step(&self.all_left(look), &from_start, weak, &mut step);
+            return step;
         }
-        let mut step = DVector::zeros(q.len());
-        let mut strong = Vec::new();
-        if !directions.is_empty() {
-            let parts = Directions::of(&turns);
-            step = parts.step(&turn, &from_start, weak);
-            strong = parts.parts.into_iter().filter(|(_, _, s)| *s >= weak).map(|(_, v, _)| v).collect();
+        let mut strong: Vec<Direction> = Vec::new();
+        if turns.count() > 0 {
+            let directions = turns.directions();
+            directions.step(&self.turn_left(look), &from_start, weak, &mut step);
+            strong = directions.parts;
+            strong.retain(|part| part.size >= weak);
         }
         if self.mode == Mode::Axis {
             return step;
         }
-        let gap = gap - &shifts * &step;
+        let moved = shifts.times(&step);
+        let mut gap = shift_left(look);
+        gap.iter_mut().zip(moved).for_each(|(gap, moved)| *gap -= moved);
         if self.by_slides {
-            let slides = Directions::of(&self.only(&shifts, JointKind::Prismatic));
-            return step + slides.step(&gap, &DVector::zeros(q.len()), 0.0);
+            let none = vec![0.0; q.len()];
+            self.by_slides(&shifts).directions().step(&gap, &none, 0.0, &mut step);
+            return step;
         }
         // What the orientation does not need.
         let mut left_free = shifts;
-        for v in &strong {
-            let used = &left_free * v;
-            left_free -= used * v.transpose();
-        }
-        let parts = Directions::of(&left_free);
-        let weak = 0.05 * weak * parts.largest();
-        step + parts.step(&gap, &from_start, weak)
+        strong.iter().for_each(|part| left_free.forget(&part.by));
+        let directions = left_free.directions();
+        directions.step(&gap, &from_start, 0.05 * weak * directions.largest(), &mut step);
+        step
+    }
+
+    /// What is left of position and orientation together. Arms: all six at once, lengths against a lever of 1 m.
+    fn all_left(&self, look: &Look) -> [f64; MOST] {
+        let mut left = shift_left(look);
+        left[3..].copy_from_slice(&self.turn_left(look)[..3]);
+        left
     }
 
     /// Why the goal was missed: a direction lost at this pose, or one that the free joints never have.
     fn missed(&self, look: &Look, free: &[bool]) -> Outcome {
         let InverseOptions { weak, .. } = self.options;
         let mut lost: Option<(f64, Twist<f64>)> = None;
-        let mut consider = |rows: DMatrix<f64>,
+        let mut consider = |equations: Equations,
                             rank: usize,
-                            weak: f64,
-                            twist: &dyn Fn(&DVector<f64>) -> Twist<f64>,
-                            error: DVector<f64>| {
-            let mut parts = Directions::of(&rows).parts;
-            parts.sort_by(|a, b| b.2.total_cmp(&a.2));
-            for (u, _, s) in parts.iter().take(rank) {
-                let left = u.dot(&error).abs();
-                if *s < weak && left > 1e-3 * error.norm() && lost.is_none_or(|(most, _)| left > most) {
-                    lost = Some((left, twist(u)));
+                            weak: &dyn Fn(f64) -> f64,
+                            twist: &dyn Fn(&[f64; MOST]) -> Twist<f64>,
+                            error: [f64; MOST]| {
+            let directions = equations.directions();
+            let weak = weak(directions.largest());
+            for Direction { moves, size, .. } in directions.parts.iter().take(rank) {
+                let left = directions::dot(moves, &error).abs();
+                if *size < weak && left > 1e-3 * norm(&error) && lost.is_none_or(|(most, _)| left > most) {
+                    lost = Some((left, twist(moves)));
                 }
             }
         };
+        let relative = |largest: f64| 0.05 * weak * largest;
         let zero = Vec3([0.0; 3]);
-        let directions = self.turn_directions(look);
         if free.iter().all(|f| *f) {
-            let turn =
-                DVector::from_iterator(directions.len(), directions.iter().map(|n| n.dot(look.turn_w)));
-            let gap = DVector::from_column_slice(&look.gap_w.0);
             let (turns, shifts) = (self.turn_rows(look, free), self.shift_rows(look, free));
             if self.mode == Mode::Pose && !self.by_slides {
-                let mut all = DMatrix::zeros(6, free.len());
-                all.rows_mut(0, 3).copy_from(&shifts);
-                all.rows_mut(3, 3).copy_from(&turns);
-                let weak = 0.05 * weak * Directions::of(&all).largest();
-                let error = DVector::from_iterator(6, gap.iter().chain(turn.iter()).copied());
-                consider(all, 6, weak, &|u| Twist::from_array([u[0], u[1], u[2], u[3], u[4], u[5]]), error);
+                let all = shifts.and(&turns);
+                consider(all, 6, &relative, &|u| Twist::from_array(*u), self.all_left(look));
             } else {
-                let turned = |u: &DVector<f64>| {
-                    let sum = directions.iter().zip(u.iter()).fold(zero, |sum, (n, x)| sum + n.times(*x));
+                let (directions, _) = self.turn_directions(look);
+                let turned = |u: &[f64; MOST]| {
+                    let sum = directions.iter().zip(u).fold(zero, |sum, (n, x)| sum + n.times(*x));
                     Twist::new(zero, sum)
                 };
-                if !directions.is_empty() {
-                    consider(turns, self.turns, weak, &turned, turn);
-                }
+                consider(turns, self.turns, &|_| weak, &turned, self.turn_left(look));
                 if self.mode != Mode::Axis {
-                    let weak = 0.05 * weak * Directions::of(&shifts).largest();
-                    let moved = |u: &DVector<f64>| Twist::new(Vec3([u[0], u[1], u[2]]), zero);
-                    consider(shifts, self.shifts, weak, &moved, gap);
+                    let moved = |u: &[f64; MOST]| Twist::new(Vec3([u[0], u[1], u[2]]), zero);
+                    consider(shifts, self.shifts, &relative, &moved, shift_left(look));
                 }
             }
         }
         lost.map_or(Outcome::Unreachable, |(_, lost_w)| Outcome::Singular { lost_w })
     }
+}
+
+/// The displacement that is missing.
+fn shift_left(look: &Look) -> [f64; MOST] {
+    let [x, y, z] = look.gap_w.0;
+    [x, y, z, 0.0, 0.0, 0.0]
 }

@@ -1,7 +1,12 @@
 //! What a calibrated machine says an instrument would read, sample by sample.
 
-use std::io::Write;
+mod decimal;
+mod table;
 
+use std::io::Write;
+use std::sync::Arc;
+
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::{CalibratedMachine, LeftOut};
@@ -9,12 +14,13 @@ use crate::chain::Chain;
 use crate::error::{Error, Result};
 use crate::feature::gravity_of;
 use crate::identify::{Beginning, Evaluator, Memories, Moment, Stretch, Values, channel, stretches};
-use crate::lie::{Mat3, Pose, Twist, Vec3};
+use crate::lie::{Mat3, Pose, Twist};
 use crate::machine::{JointKind, Machine};
-use crate::recording::{Header, NominalLength, Recording, Role, ToolPoint};
+use crate::recording::{Block, Header, NominalLength, Recording, Row, Rows, ToolPoint};
 use crate::residual::Sizes;
 use crate::sensor::{Sensor, SensorState};
-use crate::units::{ByQuantity, Rms, Unit, field_by_quantity};
+use crate::units::{ByQuantity, Rms, field_by_quantity};
+use table::Table;
 
 field_by_quantity!(rms, max, mean, mean_abs);
 
@@ -95,75 +101,45 @@ pub fn predict(
     let evaluator = Evaluator::with(machine, &sensor, state, previous_from_w, &dh, values);
     let varying = &variation.varying;
     let dead_bands = &variation.dead_bands;
-    let beginning = if varying.is_constant() {
-        None
-    } else {
+    let mut memories = Memories::new(varying);
+    let mut path = None;
+    if !varying.is_constant() {
         let mut beginning = Beginning::of(recording, machine, varying, dead_bands)?;
         let w = previous_from_w * Pose::exp(dh[machine.w_index()]);
         beginning.gravity_b = gravity_of(recording, machine, Some(w));
-        Some(beginning)
-    };
-    let pause_after = if varying.is_constant() { None } else { recording.scan()?.pause_after };
-    let mut memories = Memories::new(varying);
-    let mut path = Path::new(stretches(
-        recording,
-        machine,
-        varying,
-        dead_bands,
-        beginning.as_ref(),
-        pause_after,
-        &mut memories,
-    )?);
-    let columns = measured_columns(recording);
-    let failed = |e| Error::file(recording.path(), e);
-    if let Some(out) = &mut out {
-        write_head(*out, recording, &columns).map_err(failed)?;
+        let (pause, from) = (recording.scan()?.pause_after, Some(&beginning));
+        let stretches = stretches(recording, machine, varying, dead_bands, from, pause, &mut memories)?;
+        path = Some(Path::new(&evaluator, stretches, recording));
     }
-    let mut work = evaluator.workspace();
-    let mut sizes = ByQuantity::<Sizes>::default();
-    let (mut dropped, mut extrapolated) = (0, 0);
-    let mut unseen = vec![0u64; evaluator.piece_count()];
-    let mut farthest = vec![0.0f64; machine.commands().len()];
-    let (commands, values) = (machine.commands().len(), recording.value_count());
-    for block in recording.rows_with_text()? {
-        let block = block?;
-        for row in block.rows() {
-            let mut tail = ",".repeat(2 * columns.len());
-            if let Some(k) = row.sample {
-                let q = &block.chunk.commands[k * commands..(k + 1) * commands];
-                let measured = &block.chunk.values[k * values..(k + 1) * values];
-                let mut leaves = false;
-                for (command, farthest) in farthest.iter_mut().enumerate() {
-                    if let Some(by) = calibrated.beyond(command, q[command]) {
-                        *farthest = by.max(*farthest);
-                        leaves = true;
-                    }
-                }
-                extrapolated += u64::from(leaves);
-                let moment = if varying.is_constant() { Moment::Still } else { path.next()? };
-                let piece = evaluator.piece(moment);
-                unseen[piece] += u64::from(!variation.has_seen(piece));
-                let residuals = evaluator.residuals(q, measured, moment, &mut work, None);
-                let residuals = &residuals[..sensor.reading_count()];
-                match &sensor {
-                    Sensor::Pose => {
-                        sizes.m.take(&residuals[..3]);
-                        sizes.rad.take(&residuals[3..]);
-                    }
-                    Sensor::Joint { dyad } if is_revolute(machine, *dyad) => sizes.rad.take(residuals),
-                    _ => sizes.m.take(residuals),
-                }
-                if out.is_some() {
-                    let sign = quaternion_sign(recording, row.text, measured, &sensor);
-                    tail = cells(&columns, measured, residuals, &sensor, sign);
-                }
+    let failed = |e| Error::file(recording.path(), e);
+    let table = out.is_some().then(|| Table::new(recording, &sensor));
+    if let (Some(out), Some(table)) = (&mut out, &table) {
+        table.write_head(*out).map_err(failed)?;
+    }
+    let judge = Judge { calibrated, evaluator: &evaluator, table };
+    let mut sums = Sums::none(machine.commands().len(), evaluator.piece_count());
+    let mut rows = recording.rows_with_text()?;
+    let mut group = next_group(&mut rows, path.as_mut())?;
+    while !group.is_empty() {
+        let judged = || group.into_par_iter().map(|item| judge.block(item)).collect::<Vec<_>>();
+        // A model that depends on the path goes along it on this thread; else the next rows are read beside.
+        let (next, judged) = match &mut path {
+            None => rayon::join(|| next_group(&mut rows, None), judged),
+            Some(path) => {
+                let judged = judged();
+                (next_group(&mut rows, Some(path)), judged)
             }
+        };
+        for (own, text) in judged {
+            sums.add(&own);
             if let Some(out) = &mut out {
-                writeln!(out, "{}{tail}", row.text).map_err(failed)?;
+                out.write_all(text.as_bytes()).map_err(failed)?;
             }
         }
-        dropped += block.chunk.dropped;
+        group = next?;
     }
+    let Sums { sizes, dropped, extrapolated, farthest, pieces } = sums;
+    let unseen = || pieces.iter().enumerate().filter(|(piece, n)| **n > 0 && !variation.has_seen(*piece));
     Ok(Prediction {
         samples: sizes.samples(),
         dropped,
@@ -180,45 +156,156 @@ pub fn predict(
                 unit: if machine.command_joint(c).kind == JointKind::Revolute { "rad" } else { "m" }.into(),
             })
             .collect(),
-        unseen_directions: unseen.iter().sum(),
+        unseen_directions: unseen().map(|(_, n)| n).sum(),
         left_out,
         unseen_pieces: match &variation.varying.directions {
-            Some(directions) => {
-                let pieces = unseen.iter().enumerate().filter(|(_, n)| **n > 0);
-                pieces.map(|(piece, _)| directions.name(machine, piece)).collect()
-            }
+            Some(directions) => unseen().map(|(piece, _)| directions.name(machine, piece)).collect(),
             None => Vec::new(),
         },
     })
+}
+
+/// Blocks of rows that are judged side by side.
+const GROUP: usize = 8;
+
+/// Rows to be judged: with their residuals and pieces already where the model depends on the path.
+type Item = (Block, Option<OnPath>);
+
+fn next_group(rows: &mut Rows, mut path: Option<&mut Path>) -> Result<Vec<Item>> {
+    let with_residuals = |block: Result<Block>| {
+        let block = block?;
+        let on_path = path.as_mut().map(|path| path.next(block.chunk.len)).transpose()?;
+        Ok((block, on_path))
+    };
+    rows.take(GROUP).map(with_residuals).collect()
+}
+
+/// What samples add up to.
+struct Sums {
+    sizes: ByQuantity<Sizes>,
+    dropped: u64,
+    extrapolated: u64,
+    /// By command how far it leaves what has been seen, m or rad.
+    farthest: Vec<f64>,
+    /// Samples by piece.
+    pieces: Vec<u64>,
+}
+
+impl Sums {
+    fn none(commands: usize, pieces: usize) -> Self {
+        let sizes = ByQuantity::default();
+        Sums { sizes, dropped: 0, extrapolated: 0, farthest: vec![0.0; commands], pieces: vec![0; pieces] }
+    }
+
+    fn add(&mut self, other: &Sums) {
+        self.sizes.add(&other.sizes);
+        self.dropped += other.dropped;
+        self.extrapolated += other.extrapolated;
+        self.farthest.iter_mut().zip(&other.farthest).for_each(|(by, other)| *by = by.max(*other));
+        self.pieces.iter_mut().zip(&other.pieces).for_each(|(n, other)| *n += other);
+    }
+}
+
+/// Compares blocks of rows with the model.
+struct Judge<'a> {
+    calibrated: &'a CalibratedMachine,
+    evaluator: &'a Evaluator<'a>,
+    table: Option<Table<'a>>,
+}
+
+impl Judge<'_> {
+    /// The sums of a block, and its rows as they are to be written.
+    fn block(&self, (mut block, on_path): Item) -> (Sums, String) {
+        let Judge { calibrated, evaluator, table } = self;
+        let commands = evaluator.machine.commands().len();
+        let mut sums = Sums::none(commands, evaluator.piece_count());
+        let chunk = Arc::new(std::mem::take(&mut block.chunk));
+        let OnPath { residuals, pieces } = on_path.unwrap_or_else(|| {
+            let stretch = Stretch::plain(chunk.clone(), commands);
+            OnPath { residuals: evaluator.all_residuals(&stretch), pieces: vec![0; chunk.len] }
+        });
+        sums.dropped = chunk.dropped;
+        pieces.iter().for_each(|piece| sums.pieces[*piece] += 1);
+        for q in chunk.commands.chunks_exact(commands) {
+            let mut leaves = false;
+            for (command, farthest) in sums.farthest.iter_mut().enumerate() {
+                if let Some(by) = calibrated.beyond(command, q[command]) {
+                    *farthest = by.max(*farthest);
+                    leaves = true;
+                }
+            }
+            sums.extrapolated += u64::from(leaves);
+        }
+        let (readings, values) = (evaluator.sensor.reading_count(), chunk.values.len() / chunk.len.max(1));
+        for residual in residuals.chunks_exact(readings) {
+            match evaluator.sensor {
+                Sensor::Pose => {
+                    sums.sizes.m.take(&residual[..3]);
+                    sums.sizes.rad.take(&residual[3..]);
+                }
+                Sensor::Joint { dyad } if is_revolute(evaluator.machine, *dyad) => {
+                    sums.sizes.rad.take(residual);
+                }
+                _ => sums.sizes.m.take(residual),
+            }
+        }
+        let mut text = String::new();
+        for row in table.iter().flat_map(|table| block.rows().map(move |row| (table, row))) {
+            match row {
+                (table, Row { text: row, sample: None, .. }) => table.push_dropped(row, &mut text),
+                (table, Row { text: row, sample: Some(k), .. }) => {
+                    let measured = &chunk.values[k * values..][..values];
+                    table.push(row, measured, &residuals[k * readings..][..readings], &mut text);
+                }
+            }
+        }
+        (sums, text)
+    }
 }
 
 fn is_revolute(machine: &Machine, dyad: usize) -> bool {
     machine.dyads()[dyad].joint.as_ref().is_some_and(|j| j.kind == JointKind::Revolute)
 }
 
-/// A second pass beside the rows, sample by sample, where the model depends on the path.
+/// Residuals of samples, those of a sample one after the other, and the piece that each lies in.
+#[derive(Default)]
+struct OnPath {
+    residuals: Vec<f64>,
+    pieces: Vec<usize>,
+}
+
+/// A second pass beside the rows, where the model depends on the path.
 struct Path<'a> {
+    evaluator: &'a Evaluator<'a>,
     stretches: Box<dyn Iterator<Item = Result<Stretch>> + 'a>,
-    now: Option<Stretch>,
-    at: usize,
+    recording: &'a Recording,
+    /// What the rows have not yet come to.
+    ahead: OnPath,
 }
 
 impl<'a> Path<'a> {
-    fn new(stretches: Box<dyn Iterator<Item = Result<Stretch>> + 'a>) -> Self {
-        Path { stretches, now: None, at: 0 }
+    fn new(
+        evaluator: &'a Evaluator<'a>,
+        stretches: Box<dyn Iterator<Item = Result<Stretch>> + 'a>,
+        recording: &'a Recording,
+    ) -> Self {
+        Path { evaluator, stretches, recording, ahead: OnPath::default() }
     }
 
-    /// The next sample.
-    fn next(&mut self) -> Result<Moment<'_>> {
-        while self.now.as_ref().is_none_or(|stretch| self.at == stretch.chunk.len) {
-            match self.stretches.next().transpose()? {
-                Some(stretch) => (self.now, self.at) = (Some(stretch), 0),
-                // The file has grown shorter since the rows were read.
-                None => return Ok(Moment::Still),
-            }
+    /// The next so many samples.
+    fn next(&mut self, samples: usize) -> Result<OnPath> {
+        while self.ahead.pieces.len() < samples {
+            let Some(stretch) = self.stretches.next().transpose()? else {
+                let changed = std::io::Error::other("the file has changed while it was read");
+                return Err(Error::file(self.recording.path(), changed));
+            };
+            self.ahead.residuals.extend(self.evaluator.all_residuals(&stretch));
+            let pieces = (0..stretch.chunk.len).map(|k| self.evaluator.piece(Moment::At(&stretch, k)));
+            self.ahead.pieces.extend(pieces);
         }
-        self.at += 1;
-        Ok(self.now.as_ref().map_or(Moment::Still, |stretch| Moment::At(stretch, self.at - 1)))
+        let readings = self.evaluator.sensor.reading_count();
+        let residuals = self.ahead.residuals.drain(..samples * readings).collect();
+        Ok(OnPath { residuals, pieces: self.ahead.pieces.drain(..samples).collect() })
     }
 }
 
@@ -322,82 +409,4 @@ pub(crate) fn sensor_state(
     }
     let workpiece_point_w = header.workpiece_point;
     Ok(SensorState { tool_point_t, tool_rotation_t, workpiece_point_w, length, zero })
-}
-
-/// A measured column: its name and unit as written.
-struct Measured {
-    name: String,
-    unit: Unit,
-}
-
-fn measured_columns(recording: &Recording) -> Vec<Measured> {
-    let measured = recording.columns().iter().filter(|c| matches!(c.role, Role::Value(_)));
-    let mut columns: Vec<_> = measured.collect();
-    columns.sort_by_key(|c| match c.role {
-        Role::Value(i) => i,
-        _ => usize::MAX,
-    });
-    columns.into_iter().map(|c| Measured { name: c.name.clone(), unit: c.unit }).collect()
-}
-
-fn write_head(out: &mut dyn Write, recording: &Recording, columns: &[Measured]) -> std::io::Result<()> {
-    write!(out, "{}", recording.preamble().trim_end_matches(['\r', '\n']))?;
-    for Measured { name, unit } in columns {
-        write!(out, ",{name}_model[{unit}],{name}_residual[{unit}]")?;
-    }
-    writeln!(out)
-}
-
-/// `,model,residual` of every measured column.
-///
-/// `sign`: of the quaternion as written against the one with `qw` not negative.
-fn cells(columns: &[Measured], measured: &[f64], residuals: &[f64], sensor: &Sensor, sign: f64) -> String {
-    let mut text = String::new();
-    let mut put = |unit: Unit, model: f64, residual: f64| {
-        text.push_str(&format!(",{:.12e},{:.6e}", unit.from_si(model), unit.from_si(residual)));
-    };
-    let position = residuals.len().min(3);
-    for i in 0..position {
-        put(columns[i].unit, measured[i] - residuals[i], residuals[i]);
-    }
-    if !matches!(sensor, Sensor::Pose) {
-        return text;
-    }
-    // R_model = exp(φ)⁻¹ R_measured; the columns say it in the form in which it was measured.
-    let turn = |x: &[f64]| Pose::exp(Twist::new(Vec3([0.0; 3]), Vec3([x[0], x[1], x[2]])));
-    let model = turn(&residuals[3..6]).inverse() * turn(&measured[3..6]);
-    if columns.len() == 7 {
-        // A rotation has two quaternions: the model's is the one next to what was written.
-        let seen = quaternion(turn(&measured[3..6])).map(|c| sign * c);
-        let model = quaternion(model);
-        let near = if (0..4).map(|i| model[i] * seen[i]).sum::<f64>() < 0.0 { -1.0 } else { 1.0 };
-        for i in 0..4 {
-            put(columns[3 + i].unit, near * model[i], seen[i] - near * model[i]);
-        }
-    } else {
-        let vector = model.rotation_vector();
-        for i in 0..3 {
-            put(columns[3 + i].unit, vector.0[i], residuals[3 + i]);
-        }
-    }
-    text
-}
-
-fn quaternion(pose: Pose<f64>) -> [f64; 4] {
-    let q = nalgebra::Isometry3::from(pose).rotation;
-    [q.w, q.i, q.j, q.k]
-}
-
-/// Whether a row's quaternion is written with the sign that [`quaternion`] gives (1) or with the other one (-1).
-fn quaternion_sign(recording: &Recording, row: &str, measured: &[f64], sensor: &Sensor) -> f64 {
-    let of = |i: usize| recording.columns().iter().position(|c| c.role == Role::Value(i));
-    if !matches!(sensor, Sensor::Pose) || of(6).is_none() {
-        return 1.0;
-    }
-    let turn = Twist::new(Vec3([0.0; 3]), Vec3([measured[3], measured[4], measured[5]]));
-    let seen = quaternion(Pose::exp(turn));
-    let largest = (0..4).max_by(|a, b| seen[*a].abs().total_cmp(&seen[*b].abs())).unwrap_or(0);
-    let written = of(3 + largest).and_then(|column| row.split(',').nth(column));
-    let written = written.and_then(|cell| cell.trim().trim_matches('"').trim().parse::<f64>().ok());
-    if written.is_some_and(|x| x * seen[largest] < 0.0) { -1.0 } else { 1.0 }
 }

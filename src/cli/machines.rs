@@ -4,41 +4,7 @@ use serde_json::json;
 
 use super::Common;
 use super::output::{Failure, Outcome, print, table};
-use crate::machine::Machine;
-
-/// A list of the files of `machines/` with their texts, which the program carries.
-macro_rules! shipped {
-    ($($name:literal)+) => {
-        [$(($name, include_str!(concat!("../../machines/", $name, ".ron")))),+]
-    };
-}
-
-/// The machines that come with the program.
-const SHIPPED: [(&str, &str); 23] = shipped! {
-    "ac_head_head"
-    "ac_table_tilting"
-    "ac_table_tilting_paper"
-    "bc_head_head"
-    "bc_head_head_nutating"
-    "bc_head_table"
-    "bc_nutating_table"
-    "bc_table_tilting"
-    "dlr_justin_left"
-    "dlr_justin_right"
-    "fanuc_r2000ic_165f"
-    "four_axis_horizontal"
-    "franka_panda"
-    "hilti_jaibot"
-    "kinova_gen3_lite"
-    "kuka_iiwa14"
-    "linear_axis"
-    "puma560"
-    "rotary_axis"
-    "scara"
-    "six_r_arm"
-    "ur10"
-    "xyz_mill"
-};
+use crate::machine::{Machine, SHIPPED, shipped};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -51,7 +17,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let Some(name) = &args.name else { return list(args) };
-    let Some((_, text)) = SHIPPED.iter().find(|(own, _)| own == name) else {
+    let Some(text) = shipped(name) else {
         return Err(Failure::Told {
             what: format!("no machine \"{name}\" comes with the program"),
             mend: "`kincal machines` lists them".into(),

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::error::Place;
-use crate::machine::Machine;
+use crate::machine::{Machine, shipped};
 use crate::recording::{Recording, open_all};
 use indicatif::ProgressBar;
 
@@ -59,13 +59,17 @@ fn misplaced(path: &Path, is: &str, expected: &str) -> Failure {
     }
 }
 
-/// Opens a machine file by `open`; a recording in its place is told as such.
+/// Opens a machine file by `open`; a recording in its place is told as such, and the name of a machine that comes with the program.
 pub(crate) fn open_machine<T>(
     path: &Path,
     open: impl FnOnce(&Path) -> crate::error::Result<T>,
 ) -> Outcome<T> {
-    open(path).map_err(|error| match looks_like(path) {
-        Some(Looks::Recording) => misplaced(path, "recording", "machine file"),
+    open(path).map_err(|error| match (looks_like(path), path.file_stem().and_then(|stem| stem.to_str())) {
+        (Some(Looks::Recording), _) => misplaced(path, "recording", "machine file"),
+        (_, Some(name)) if !path.exists() && shipped(name).is_some() => Failure::Told {
+            what: format!("{}: nothing is there", path.display()),
+            mend: format!("`kincal machines {name} > {name}.ron` writes the machine of that name, which comes with the program"),
+        },
         _ => error.into(),
     })
 }

@@ -1,5 +1,6 @@
 //! `kincal predict`
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
@@ -8,7 +9,7 @@ use crate::predict::{Beyond, Prediction, predict};
 
 use super::Common;
 use super::files::Output;
-use super::output::{Failure, Kind, Outcome, count, open_machine, open_recordings, write_whole};
+use super::output::{Failure, Kind, Outcome, count, open_machine, open_recordings, write_checked};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -50,21 +51,21 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if args.fit_setup {
         progress.say("finding the set-up");
         calibrated = fit_setup(&calibrated, &recordings, Loss::default())?;
-    } else {
-        progress.say(&format!("reading {}", recordings[0].name()));
-        recordings[0].scan()?;
     }
     progress.say(&format!("predicting {}", recordings[0].name()));
-    let mut prediction = None;
-    match &args.output {
-        None => prediction = Some(predict(&calibrated, &recordings[0], None)?),
-        Some(path) => write_whole(path, |out| {
-            prediction = Some(predict(&calibrated, &recordings[0], Some(out))?);
-            Ok(())
-        })?,
-    }
+    let predicted = |out: Option<&mut dyn Write>| {
+        let prediction = predict(&calibrated, &recordings[0], out)?;
+        if prediction.samples == 0 {
+            // Says what is missing.
+            recordings[0].scan()?;
+        }
+        Ok(prediction)
+    };
+    let prediction = match &args.output {
+        None => predicted(None)?,
+        Some(path) => write_checked(path, |out| predicted(Some(out)), |_, _| Ok(()))?,
+    };
     drop(progress);
-    let Some(prediction) = prediction else { return Ok(()) };
     let mut text = render(&prediction, recordings[0].name());
     if let Some(path) = &args.output {
         text.push_str(&format!("written to {}\n", path.display()));

@@ -71,6 +71,17 @@ pub struct Meaningless {
     pub share: f64,
 }
 
+impl Finding {
+    /// Names that cannot be told from its own count for its own: to the others goes what that leaves.
+    pub(super) fn share_out(&mut self) {
+        let others: f64 = self.confusable_with.iter().map(|other| other.probability).sum();
+        let left = (1.0 - self.probability).max(0.0);
+        if others > left {
+            self.confusable_with.iter_mut().for_each(|other| other.probability *= left / others);
+        }
+    }
+}
+
 /// Another name for the same.
 #[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -1,8 +1,9 @@
 //! Which family describes what was modelled as a part without a name, `docs/diagnosis-method.md` (82).
 //!
-//! Real shapes depart from those of textbooks, and several small things act at one place. So the families compete there with each other and
-//! with none, beside everything that was found elsewhere, while a free function of the place may depart from each by a part of its size
-//! that nobody knows.
+//! Real shapes depart from those of textbooks, and several things act at one place, each driven by a motion of its own: a cable brings
+//! along another axis, and loses motion where its own axis turns round. So the families compete for what the same joints drive at one place,
+//! with each other and with none, beside everything else that was found, while a free function of these joints may depart from each by a
+//! part of its size that nobody knows.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,11 +17,13 @@ use super::marginal::Marginal;
 use super::odds::LISTED;
 use super::parts::{Unnamed, is_foretold};
 use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
+use crate::effects::Candidate;
+use crate::feature::Dependence;
 
 /// Parts of its size by which the shape of what happens may depart from its family's; each is as likely beforehand.
 const DEPARTURES: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
 
-/// How often what is found at a place has no name.
+/// How often what is found has no name.
 const NAMELESS: f64 = 0.2;
 /// So many hypotheses are compared.
 const COMPARED: usize = 12;
@@ -33,20 +36,37 @@ pub(super) const LIKELY: f64 = 0.5;
 pub struct LikelyName {
     /// Name of a family.
     pub effect: String,
-    /// Its probability at the part's place, against all other names there and none.
+    /// Its probability, against all other names for what the same joints drive at the part's place, and none.
     pub probability: f64,
+}
+
+/// Parts that belong together: at one place, driven by the same joints.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Group {
+    /// The dyad of the place; `None` for the instrument.
+    place: Option<usize>,
+    /// Dyads of the joints that it depends on, in their order.
+    drivers: Vec<usize>,
 }
 
 /// What was modelled, after families were asked for.
 pub(super) struct Naming {
-    /// Terms that have a name, and its probability.
-    pub told: Vec<(ModelTerm, f64)>,
+    /// Terms that have a name.
+    pub told: Vec<GivenName>,
     /// What stays without.
     pub parts: Vec<ModelTerm>,
-    /// Names that come into question, by the dyad of the place.
-    pub likely: Vec<(Option<usize>, Vec<LikelyName>)>,
-    /// The dyads of all places, the one of which most is there first.
-    pub places: Vec<Option<usize>>,
+    /// Names that come into question, by group.
+    likely: Vec<(Group, Vec<LikelyName>)>,
+    /// All groups, the one of which most is there first.
+    groups: Vec<Group>,
+}
+
+/// A part that has a name now.
+pub(super) struct GivenName {
+    pub term: ModelTerm,
+    pub probability: f64,
+    /// What it was a part of.
+    pub group: Group,
 }
 
 impl Naming {
@@ -55,41 +75,46 @@ impl Naming {
         Naming { told: Vec::new(), parts: Vec::new(), ..self }
     }
 
-    /// Names that come into question at a place.
-    pub fn likely_at(&self, place: Option<usize>) -> Vec<LikelyName> {
-        self.likely.iter().find(|(at, _)| *at == place).map(|(_, names)| names.clone()).unwrap_or_default()
+    /// Names that come into question for a group.
+    pub fn likely(&self, group: &Group) -> Vec<LikelyName> {
+        self.likely.iter().find(|(own, _)| own == group).map(|(_, names)| names.clone()).unwrap_or_default()
+    }
+
+    /// The how many-th of all places that of a group is, by how much is there.
+    pub fn rank(&self, group: &Group) -> Option<usize> {
+        self.groups.iter().position(|other| other.place == group.place)
     }
 }
 
-/// A family that comes into question at a place.
+/// A family that comes into question.
 struct Name {
     /// Its best hypothesis.
     hypothesis: Hypothesis,
-    /// Probability of its name there, all forms of it together.
+    /// Probability of its name, all forms of it together.
     probability: f64,
 }
 
-/// The families at one place, the likeliest first.
+/// Families in question, the likeliest first.
 struct Names {
     all: Vec<Name>,
-    /// The likeliest as a term beside everything that was found elsewhere.
+    /// The likeliest as a term beside everything else that was found.
     best: ModelTerm,
 }
 
 impl Unnamed {
-    /// Gives their names to these parts, place by place, the largest first, where a name is likely and foretells what was left out; what a
+    /// Gives their names to these parts, group by group, the largest first, where a name is likely and foretells what was left out; what a
     /// part does beside it stays only if that foretells more. Beside something larger that has no name, a name may be for its shadow: the
-    /// first place without one ends it.
+    /// first group without one ends it.
     pub fn named(&self, search: &Search, in_model: &[ModelTerm], mut parts: Vec<ModelTerm>) -> Naming {
-        let places = self.places(search, in_model, &parts);
-        let (mut told, mut likely): (Vec<(ModelTerm, f64)>, Vec<_>) = (Vec::new(), Vec::new());
+        let groups = self.groups(search, in_model, &parts);
+        let (mut told, mut likely): (Vec<GivenName>, Vec<_>) = (Vec::new(), Vec::new());
         let mut is_open = true;
         // Settled positions show no course: any family of where a joint stands comes near there.
-        for here in places.iter().filter(|_| search.in_motion) {
+        for here in groups.iter().filter(|_| search.in_motion) {
             (search.progress)("naming what was modelled");
             let (own, elsewhere): (Vec<ModelTerm>, Vec<ModelTerm>) =
-                parts.iter().cloned().partition(|part| self.place(part) == *here);
-            let found = told.iter().map(|(term, _)| term.clone());
+                parts.iter().cloned().partition(|part| self.group(part) == *here);
+            let found = told.iter().map(|given| given.term.clone());
             let mut all: Vec<ModelTerm> = in_model.iter().cloned().chain(found).collect();
             all.extend(elsewhere.iter().cloned());
             let Some(names) = self.names(search, &own, &all) else {
@@ -99,7 +124,7 @@ impl Unnamed {
             let effect = |name: &Name| self.candidates[name.hypothesis.candidate].told_as.clone();
             let listed = names.all.iter().take_while(|name| name.probability > LISTED);
             let listed = listed.map(|n| LikelyName { effect: effect(n), probability: n.probability });
-            likely.push((*here, listed.collect()));
+            likely.push((here.clone(), listed.collect()));
             let probability = names.all[0].probability;
             all.push(names.best.clone());
             is_open &= probability > LIKELY && is_foretold(search, &all, all.len() - 1);
@@ -114,36 +139,44 @@ impl Unnamed {
                     false => drop(all.pop()),
                 }
             }
-            told.push((names.best, probability));
+            told.push(GivenName { term: names.best, probability, group: here.clone() });
         }
-        Naming { told, parts, likely, places }
+        Naming { told, parts, likely, groups }
     }
 
-    /// The places of these parts by how much of what is there goes with all parts of a place together, most first.
-    fn places(&self, search: &Search, in_model: &[ModelTerm], parts: &[ModelTerm]) -> Vec<Option<usize>> {
-        let mut places: Vec<Option<usize>> = Vec::new();
+    /// What a term belongs to.
+    pub fn group(&self, term: &ModelTerm) -> Group {
+        let candidate = &self.candidates[term.candidate];
+        Group { place: candidate.place.dyad(), drivers: drivers(candidate) }
+    }
+
+    /// The groups of these parts by how much of what is there goes with all parts of a group together, most first.
+    fn groups(&self, search: &Search, in_model: &[ModelTerm], parts: &[ModelTerm]) -> Vec<Group> {
+        let mut groups: Vec<Group> = Vec::new();
         for part in parts {
-            if !places.contains(&self.place(part)) {
-                places.push(self.place(part));
+            let own = self.group(part);
+            if !groups.contains(&own) {
+                groups.push(own);
             }
         }
-        let left_without = |place: &Option<usize>| {
-            let others = parts.iter().filter(|part| self.place(part) != *place);
+        let left_without = |group: &Group| {
+            let others = parts.iter().filter(|part| self.group(part) != *group);
             let others: Vec<ModelTerm> = in_model.iter().chain(others).cloned().collect();
             search.rows.residual.dot(&search.beside_names(&others).apply(&search.rows.residual))
         };
-        let mut by_size: Vec<(f64, Option<usize>)> =
-            places.into_iter().map(|place| (left_without(&place), place)).collect();
+        let mut by_size: Vec<(f64, Group)> =
+            groups.into_iter().map(|group| (left_without(&group), group)).collect();
         by_size.sort_by(|a, b| b.0.total_cmp(&a.0));
-        by_size.into_iter().map(|(_, place)| place).collect()
+        by_size.into_iter().map(|(_, group)| group).collect()
     }
 
-    /// Names for what is at the place of the first of `own`, all of which are there, beside the `others`. `search`: with free functions.
+    /// Names for what the group of `own`, which is all of it, does beside the `others`. `search`: with free functions.
     fn names(&self, search: &Search, own: &[ModelTerm], others: &[ModelTerm]) -> Option<Names> {
-        let place = self.place(own.first()?);
-        let here = |c: &usize| self.candidates[*c].place.dyad() == place && !search.goes_by_clock(*c);
+        let group = self.group(own.first()?);
+        let here = |c: &usize| self.candidates[*c].place.dyad() == group.place && !search.goes_by_clock(*c);
         let all: Vec<usize> = (0..self.candidates.len()).filter(here).collect();
-        let (families, free): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|c| *c < self.first);
+        let (families, mut free): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|c| *c < self.first);
+        free.retain(|c| drivers(&self.candidates[*c]) == group.drivers);
         // By how much chance is larger than the noise says counts against all of them alike.
         let taken_in = [others, own].concat();
         let overdispersion = search.leftover(&search.beside_names(&taken_in)).overdispersion.max(1.0);
@@ -190,7 +223,7 @@ impl Unnamed {
         Some(Names { all, best: ModelTerm { state, near: families, ..best } })
     }
 
-    /// Whitened columns of a free function of the place that is, with standard normal coefficients, as large as what is there, the energy
+    /// Whitened columns of a free function of the group that is, with standard normal coefficients, as large as what is there, the energy
     /// of that, and the logarithm of the evidence of the best such function alone.
     fn departure(
         &self,
@@ -212,4 +245,17 @@ impl Unnamed {
         let energy = solution.dot(&(gram * &solution));
         (spread > 0.0 && energy > 0.0).then(|| (columns * (energy / spread).sqrt(), energy, alone))
     }
+}
+
+/// Dyads of the joints that a candidate depends on, in their order.
+fn drivers(candidate: &Candidate) -> Vec<usize> {
+    let joint = |on: Dependence| match on {
+        Dependence::Joint(_, j) => Some(j),
+        Dependence::Other(_) => None,
+    };
+    let mut all: Vec<usize> =
+        candidate.features.iter().flat_map(|feature| feature.depends_on()).filter_map(joint).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }

@@ -8,7 +8,7 @@ use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
 use super::held_out::Model;
 use super::marginal::Marginal;
-use super::names::LIKELY;
+use super::names::{GivenName, LIKELY, Naming};
 use super::noise::Noise;
 use super::odds::{Odds, confusable, odds, trust};
 use super::orders;
@@ -137,7 +137,7 @@ pub(super) fn report(
         let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
         let (modelled, only_told) = unnamed.parts(search, &known);
         let naming = unnamed.named(search, &known, modelled.clone());
-        let found = naming.told.iter().map(|(term, _)| term).chain(&naming.parts);
+        let found = naming.told.iter().map(|given| &given.term).chain(&naming.parts);
         let all: Vec<ModelTerm> = known.iter().chain(found).cloned().collect();
         let is_modelled = !modelled.is_empty()
             && folds::remaining(search, &all, known.len()).is_some_and(|part| part <= HALF);
@@ -146,8 +146,9 @@ pub(super) fn report(
             false => (naming.withdrawn(), modelled.into_iter().chain(only_told).collect()),
         };
         for k in 0..naming.told.len() {
-            let others = [known.as_slice(), &naming.parts].concat();
-            told.extend(promoted(search, &others, &naming.told, k, &shares, (machine, library)));
+            let others = naming.parts.iter().filter(|part| unnamed.group(part) != naming.told[k].group);
+            let others: Vec<ModelTerm> = known.iter().chain(others).cloned().collect();
+            told.extend(promoted(search, &others, &naming, k, &shares, (machine, library)));
         }
         told.sort_by(|a, b| b.finding.delta_bic.total_cmp(&a.finding.delta_bic));
         let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
@@ -159,8 +160,8 @@ pub(super) fn report(
         let (told_terms, rest) = described.split_at(told.len());
         told.iter_mut().zip(told_terms).for_each(|(told, (_, named))| told.named = named.clone());
         of_companions = Some(rest.iter().map(|(_, named)| named.clone()).collect::<Vec<Named>>());
-        let names = |term: &ModelTerm| naming.likely_at(unnamed.place(term));
-        let rank = |term: &ModelTerm| naming.places.iter().position(|place| *place == unnamed.place(term));
+        let names = |term: &ModelTerm| naming.likely(&unnamed.group(term));
+        let rank = |term: &ModelTerm| naming.rank(&unnamed.group(term));
         let mut shown_parts = Vec::new();
         for ((part, named), term) in of_shown.into_iter().zip(&shown) {
             shown_parts.push((rank(term), UnnamedPart { names: names(term), ..part }));
@@ -232,6 +233,7 @@ pub(super) fn report(
     folds::fill(search, &in_model, &mut diagnosis);
     traces::fill(search, &kept, &left_over, machine, &mut diagnosis);
     orders::join(search, &kept, &mut diagnosis);
+    diagnosis.findings.iter_mut().for_each(Finding::share_out);
     diagnosis
 }
 
@@ -243,24 +245,29 @@ struct Told {
     placebo: Option<Placebo>,
 }
 
-/// The finding of a part that got a name, beside the others that did. Its size is that of all that happens at its place; what the model
-/// leaves to a free function there departs from it.
+/// The finding of a part that got a name, beside the `others`. Its size is that of all that its group does; what the model leaves to a free
+/// function there departs from it.
 fn promoted(
     search: &Search,
     others: &[ModelTerm],
-    told: &[(ModelTerm, f64)],
+    naming: &Naming,
     k: usize,
     shares: &Shares,
     (machine, library): (&Machine, &Library),
 ) -> Option<Told> {
-    let place = |term: &ModelTerm| search.candidates[term.candidate].place.dyad();
-    let (term, probability) = &told[k];
-    let named = told.iter().map(|(term, _)| term);
-    let others = others.iter().filter(|other| place(other) != place(term));
-    let all: Vec<ModelTerm> = named.chain(others).cloned().collect();
+    let GivenName { term, probability, group } = &naming.told[k];
+    let named = naming.told.iter().map(|given| given.term.clone());
+    let all: Vec<ModelTerm> = named.chain(others.iter().cloned()).collect();
     let model = Model::new(search, &all);
     let (finding, named) = finding(search, &all, k, shares, (machine, library), &model)?;
-    let finding = Finding { probability: *probability, ..finding };
+    let mut finding = Finding { probability: *probability, ..finding };
+    // What else it may be there has been asked together with its name.
+    let names = naming.likely(group);
+    finding.confusable_with.retain_mut(|other| {
+        let asked = names.iter().find(|name| name.effect == other.effect && other.at == finding.at);
+        other.probability = asked.map_or(0.0, |name| name.probability);
+        asked.is_some()
+    });
     Some(Told { term: term.clone(), finding, named, placebo: None })
 }
 

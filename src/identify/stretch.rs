@@ -23,6 +23,11 @@ pub(crate) struct Stretch {
 }
 
 impl Stretch {
+    /// Samples of a model that nothing varies in.
+    pub fn plain(chunk: Arc<Chunk>, commands: usize) -> Stretch {
+        Stretch { chunk, motion: Motion::default(), features: Vec::new(), commands }
+    }
+
     /// Directions of travel of all commands at sample `k`; empty where nothing depends on them.
     #[inline]
     pub fn directions(&self, k: usize) -> &[i8] {
@@ -120,8 +125,7 @@ pub(crate) fn stretches<'a>(
     let commands = machine.commands().len();
     let chunks = recording.shared_chunks()?;
     let Some(beginning) = beginning else {
-        let plain = move |chunk| Stretch { chunk, motion: Motion::default(), features: Vec::new(), commands };
-        return Ok(Box::new(chunks.map(move |chunk| chunk.map(plain))));
+        return Ok(Box::new(chunks.map(move |chunk| Ok(Stretch::plain(chunk?, commands)))));
     };
     let mut tracker = Tracker::new(dead_bands.to_vec(), beginning.commands.clone());
     if varying.terms.is_empty() {

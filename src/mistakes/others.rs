@@ -2,35 +2,8 @@
 
 use super::thinned::{Sample, Thinned};
 use crate::error::Result;
-use crate::machine::{Machine, MachineForm};
+use crate::machine::{Machine, MachineForm, SHIPPED};
 use crate::recording::Recording;
-
-/// The texts of the machines that come with the program; a test compares them with the folder.
-const SHIPPED: [&str; 23] = [
-    include_str!("../../machines/ac_head_head.ron"),
-    include_str!("../../machines/ac_table_tilting.ron"),
-    include_str!("../../machines/ac_table_tilting_paper.ron"),
-    include_str!("../../machines/bc_head_head.ron"),
-    include_str!("../../machines/bc_head_head_nutating.ron"),
-    include_str!("../../machines/bc_head_table.ron"),
-    include_str!("../../machines/bc_nutating_table.ron"),
-    include_str!("../../machines/bc_table_tilting.ron"),
-    include_str!("../../machines/dlr_justin_left.ron"),
-    include_str!("../../machines/dlr_justin_right.ron"),
-    include_str!("../../machines/fanuc_r2000ic_165f.ron"),
-    include_str!("../../machines/four_axis_horizontal.ron"),
-    include_str!("../../machines/franka_panda.ron"),
-    include_str!("../../machines/hilti_jaibot.ron"),
-    include_str!("../../machines/kinova_gen3_lite.ron"),
-    include_str!("../../machines/kuka_iiwa14.ron"),
-    include_str!("../../machines/linear_axis.ron"),
-    include_str!("../../machines/puma560.ron"),
-    include_str!("../../machines/rotary_axis.ron"),
-    include_str!("../../machines/scara.ron"),
-    include_str!("../../machines/six_r_arm.ron"),
-    include_str!("../../machines/ur10.ron"),
-    include_str!("../../machines/xyz_mill.ron"),
-];
 
 /// A machine in place of the one that was given.
 pub(super) struct Other {
@@ -68,7 +41,7 @@ pub(super) fn others(machine: &Machine) -> Vec<Other> {
 
 /// The machines that come with the program.
 pub(super) fn shipped() -> Vec<Machine> {
-    SHIPPED.iter().filter_map(|text| Machine::parse("shipped", text).ok()).collect()
+    SHIPPED.iter().filter_map(|(name, text)| Machine::parse(name, text).ok()).collect()
 }
 
 /// The machine with its branches exchanged; none where something hangs beside the chain.
@@ -98,18 +71,5 @@ impl Other {
             other.recording(&self.machine)
         };
         thinned.iter().map(one).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{SHIPPED, shipped};
-
-    #[test]
-    fn every_machine_of_the_folder_is_tried() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/machines");
-        let files = std::fs::read_dir(folder).expect("the folder").filter_map(Result::ok);
-        let files = files.filter(|file| file.path().extension().is_some_and(|end| end == "ron")).count();
-        assert_eq!((SHIPPED.len(), shipped().len()), (files, files));
     }
 }

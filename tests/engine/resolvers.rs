@@ -69,7 +69,7 @@ fn diagnosis(resolver: Resolver, seed: u64) -> Result<Diagnosis, TestCaseError> 
 }
 
 fn draws() -> u32 {
-    std::env::var("KINCAL_DRAWS").ok().and_then(|n| n.parse().ok()).unwrap_or(8)
+    std::env::var("KINCAL_DRAWS").ok().and_then(|n| n.parse().ok()).unwrap_or(5)
 }
 
 /// Size of a finding's number of this name, SI.
@@ -107,7 +107,7 @@ fn the_delay_of_a_resolver_is_no_lost_motion_and_its_wave_has_its_order() {
 
 /// `KINCAL_DRAWS` of them where somebody has the time.
 #[test]
-#[ignore = "long: eight diagnoses"]
+#[ignore = "long: five diagnoses"]
 fn more_resolvers_are_told() {
     resolvers_are_told(draws());
 }
