@@ -17,7 +17,6 @@ use super::marginal::Marginal;
 use super::odds::LISTED;
 use super::parts::{Unnamed, is_foretold};
 use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
-use crate::effects::Candidate;
 use crate::feature::Dependence;
 
 /// Parts of its size by which the shape of what happens may depart from its family's; each is as likely beforehand.
@@ -146,8 +145,20 @@ impl Unnamed {
 
     /// What a term belongs to.
     pub fn group(&self, term: &ModelTerm) -> Group {
-        let candidate = &self.candidates[term.candidate];
-        Group { place: candidate.place.dyad(), drivers: drivers(candidate) }
+        self.group_of(term.candidate)
+    }
+
+    fn group_of(&self, candidate: usize) -> Group {
+        let candidate = &self.candidates[candidate];
+        let joint = |on: Dependence| match on {
+            Dependence::Joint(_, j) => Some(j),
+            Dependence::Other(_) => None,
+        };
+        let on = candidate.features.iter().flat_map(|feature| feature.depends_on());
+        let mut drivers: Vec<usize> = on.filter_map(joint).collect();
+        drivers.sort_unstable();
+        drivers.dedup();
+        Group { place: candidate.place.dyad(), drivers }
     }
 
     /// The groups of these parts by how much of what is there goes with all parts of a group together, most first.
@@ -173,10 +184,9 @@ impl Unnamed {
     /// Names for what the group of `own`, which is all of it, does beside the `others`. `search`: with free functions.
     fn names(&self, search: &Search, own: &[ModelTerm], others: &[ModelTerm]) -> Option<Names> {
         let group = self.group(own.first()?);
-        let here = |c: &usize| self.candidates[*c].place.dyad() == group.place && !search.goes_by_clock(*c);
+        let here = |c: &usize| self.group_of(*c) == group && !search.goes_by_clock(*c);
         let all: Vec<usize> = (0..self.candidates.len()).filter(here).collect();
-        let (families, mut free): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|c| *c < self.first);
-        free.retain(|c| drivers(&self.candidates[*c]) == group.drivers);
+        let (families, free): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|c| *c < self.first);
         // By how much chance is larger than the noise says counts against all of them alike.
         let taken_in = [others, own].concat();
         let overdispersion = search.leftover(&search.beside_names(&taken_in)).overdispersion.max(1.0);
@@ -245,17 +255,4 @@ impl Unnamed {
         let energy = solution.dot(&(gram * &solution));
         (spread > 0.0 && energy > 0.0).then(|| (columns * (energy / spread).sqrt(), energy, alone))
     }
-}
-
-/// Dyads of the joints that a candidate depends on, in their order.
-fn drivers(candidate: &Candidate) -> Vec<usize> {
-    let joint = |on: Dependence| match on {
-        Dependence::Joint(_, j) => Some(j),
-        Dependence::Other(_) => None,
-    };
-    let mut all: Vec<usize> =
-        candidate.features.iter().flat_map(|feature| feature.depends_on()).filter_map(joint).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
 }
