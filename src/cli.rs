@@ -4,6 +4,7 @@ mod calibrate;
 mod check;
 mod compare;
 mod compensate;
+mod convert;
 mod demo;
 mod describe;
 mod diagnose;
@@ -61,6 +62,8 @@ enum Command {
     Simulate(Box<simulate::Args>),
     /// A machine file from a URDF file
     Import(import::Args),
+    /// A recording from a table of another program: other names, units, separators, forms of rotations
+    Convert(Box<convert::Args>),
     /// The machines that come with the program, or the file of one of them
     Machines(machines::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
@@ -117,6 +120,7 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Verify(args) => verify::run(args),
         Command::Simulate(args) => simulate::run(args, files),
         Command::Import(args) => import::run(args),
+        Command::Convert(args) => convert::run(args, files),
         Command::Machines(args) => machines::run(args),
         Command::Demo(args) => demo::run(args),
     }

@@ -51,6 +51,7 @@
 //! | [`compensate`](mod@compensate) | NC programs rewritten so that the actual machine cuts what they mean |
 //! | [`simulate`] | recordings of machines whose errors are known: faults, tests, instruments |
 //! | [`import`](mod@import) | machines from URDF (feature `import`) |
+//! | [`convert`](mod@convert) | recordings from foreign tables (feature `import`) |
 //! | `demo` | the reference machine, a simulated recording, and what a diagnosis says of it |
 //! | `cli` | the command line, a thin face over all of it (feature `cli`) |
 //!
@@ -113,6 +114,8 @@ pub mod check;
 #[cfg(feature = "cli")]
 mod cli;
 pub mod compensate;
+#[cfg(feature = "import")]
+pub mod convert;
 #[cfg(not(feature = "internals"))]
 mod demo;
 #[cfg(feature = "internals")]

@@ -170,7 +170,7 @@ impl Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let recordings = open_recordings(&args.recordings, &machine)?;
+    let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
     let progress = args.common.progress();
     let found = calibrate_model(&machine, &recordings, &args.model(&machine)?, args.options(), &|text| {
         progress.say(text)

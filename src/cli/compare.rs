@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let tuning = Tuning { tau: args.tau, cut: args.cut, steps: args.steps as usize };
     let rivals = chosen(&args.rivals, tuning)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let open = |paths: &[PathBuf]| open_recordings(paths, &machine);
+    let open = |paths: &[PathBuf]| open_recordings(paths, &machine, &args.machine);
     let (mut fit_on, mut judge_on) = (open(&args.recordings)?, open(&args.judge)?);
     let truth = match &args.truth {
         None => None,

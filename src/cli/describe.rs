@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     if !args.recordings.is_empty() {
         let machine = calibrated.machine();
-        let recordings = open_recordings(&args.recordings, machine)?;
+        let recordings = open_recordings(&args.recordings, machine, &args.machine)?;
         let reach = reach(machine, &recordings)?;
         let _ = writeln!(
             text,

@@ -46,7 +46,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let recordings = open_recordings(&args.recordings, &machine)?;
+    let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
     let mut library = Library::standard();
     for path in &args.effects {
         library = library.with_file(path)?;

@@ -4,9 +4,9 @@ use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::error::Place;
+use crate::error::{Error, Place};
 use crate::machine::{Machine, shipped};
-use crate::recording::{Recording, open_all};
+use crate::recording::{Recording, RecordingFault, open_all};
 use indicatif::ProgressBar;
 
 use super::Common;
@@ -74,12 +74,64 @@ pub(crate) fn open_machine<T>(
     })
 }
 
-/// Opens the recordings of a call; a machine file among them is told as such.
-pub(crate) fn open_recordings(paths: &[PathBuf], machine: &Machine) -> Outcome<Vec<Recording>> {
+/// Opens the recordings of a call; a machine file among them is told as such, and a table of another program gets the command that makes
+/// a recording of it.
+pub(crate) fn open_recordings(
+    paths: &[PathBuf],
+    machine: &Machine,
+    machine_file: &Path,
+) -> Outcome<Vec<Recording>> {
     open_all(paths, machine).map_err(|error| {
         let at_fault = paths.iter().find(|path| looks_like(path) == Some(Looks::Machine));
-        at_fault.map_or_else(|| error.into(), |path| misplaced(path, "machine file", "recording"))
+        if let Some(path) = at_fault {
+            return misplaced(path, "machine file", "recording");
+        }
+        match foreign(&error) {
+            Some(table) => Failure::Told {
+                what: error.to_string(),
+                mend: format!("{}\n  = {}", error.mend(), converting(table, machine_file)),
+            },
+            None => error.into(),
+        }
     })
+}
+
+/// The file that an error is about, where it is no recording at all: nothing in it says what was measured.
+fn foreign(error: &Error) -> Option<&Path> {
+    use RecordingFault::{BadColumn, NoHeaderRow, NoMeasurement, NoUnit, NotUtf8, Separator, UnknownUnit};
+    let is_of_form = matches!(
+        error.fault(),
+        Some(
+            BadColumn { .. }
+                | NoHeaderRow
+                | NoMeasurement
+                | NoUnit { .. }
+                | NotUtf8
+                | Separator { .. }
+                | UnknownUnit { .. }
+        )
+    );
+    let file = &error.place().filter(|_| is_of_form)?.file;
+    let mut start = Vec::new();
+    std::fs::File::open(file).ok()?.take(1 << 16).read_to_end(&mut start).ok()?;
+    let text = String::from_utf8_lossy(&start);
+    let mut keys =
+        text.lines().filter_map(|line| line.trim().trim_start_matches('\u{feff}').strip_prefix('#'));
+    (!keys.any(|key| key.trim_start().starts_with("meas"))).then_some(file)
+}
+
+/// The command that makes a recording of a table, ready to be pasted.
+fn converting(table: &Path, machine: &Path) -> String {
+    let name = table.file_stem().unwrap_or_default().to_string_lossy();
+    let output = table.with_file_name(format!("{name}_rec.csv"));
+    let [table, machine, output] = [table, machine, &output].map(|path| {
+        let text = path.display().to_string();
+        let plain = |c: char| c.is_alphanumeric() || "/._-+,:\\".contains(c);
+        if text.chars().all(plain) { text } else { format!("'{text}'") }
+    });
+    format!(
+        "a table of another program becomes a recording by: kincal convert {table} --machine {machine} -o {output}"
+    )
 }
 
 /// The line of a text file that a message is about, with a mark below the column (machine files only: a recording's

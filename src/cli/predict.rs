@@ -35,7 +35,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Outcome {
     let files: Vec<PathBuf> = std::iter::once(&args.recording).chain(&args.beside).cloned().collect();
     let mut calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
-    let recordings = open_recordings(&files, calibrated.machine())?;
+    let recordings = open_recordings(&files, calibrated.machine(), &args.machine)?;
     if recordings.len() > 1 {
         return Err(Failure::Told {
             what: format!(

@@ -22,7 +22,7 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 13] = [
+const TABLE: [Row; 14] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--json"]),
@@ -49,6 +49,7 @@ const TABLE: [Row; 13] = [
         &["--output", "--nc", "--truth", "--json"],
     ),
     row("import", &[], &["ROBOT.urdf"], &["--output", "--json"]),
+    row("convert", &[], &["FILE", "--machine", "--map"], &["--write-map", "--output", "--json"]),
     row("machines", &[], &[], &["--json"]),
     row("demo", &[], &[], &["--report", "--json"]),
 ];
@@ -65,7 +66,7 @@ impl Row {
             command.args([name, path]);
         }
         // What a command cannot do without.
-        let needs_output = ["join", "simulate", "import"].contains(&self.command);
+        let needs_output = ["join", "simulate", "import", "convert"].contains(&self.command);
         if needs_output && written.iter().all(|(name, _)| *name != "--output") {
             command.args(["--output", "elsewhere"]);
         }

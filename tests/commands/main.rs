@@ -7,6 +7,7 @@ mod cli;
 mod compare;
 mod compensate;
 mod diagnose;
+mod docs_convert;
 mod docs_effects;
 mod docs_equations;
 mod docs_recordings;

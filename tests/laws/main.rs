@@ -12,6 +12,7 @@ mod bad_machines;
 mod batch;
 mod calibrated;
 mod compensate;
+mod convert;
 mod effects;
 mod effects_in_files;
 mod features;

@@ -1,0 +1,177 @@
+//! `kincal convert`
+
+use std::path::{Path, PathBuf};
+
+use crate::convert::{Request, Written, open};
+use crate::machine::Machine;
+use serde_json::json;
+
+use super::Common;
+use super::files::{Files, Output};
+use super::output::{Failure, Outcome, count, open_machine, write_whole};
+
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Table of another program: text with any separator, .npy, .rtl, .rta
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Machine whose joints are in the table; what is written is read back with it
+    #[arg(long, value_name = "MACHINE.ron")]
+    machine: Option<PathBuf>,
+    /// Which column is what, instead of a guess from the headings; see docs/convert.md
+    #[arg(long, value_name = "MAP.ron")]
+    map: Option<PathBuf>,
+    /// Where to write the map that was found
+    #[arg(long, value_name = "MAP.ron")]
+    write_map: Option<Output>,
+    /// What was measured: position, pose, joint, distance or displacement
+    #[arg(long, value_name = "KIND", conflicts_with = "map")]
+    measurement: Option<String>,
+    /// A column of the recording and the heading (or `#3`, the number) of its column in the table; `q*=Axis *` for all joints
+    #[arg(long, value_name = "NAME=COLUMN", value_parser = pair, conflicts_with = "map")]
+    column: Vec<(String, String)>,
+    /// Unit of a column, or of all columns of `length`, `angle` or `time` whose heading names none
+    #[arg(long, value_name = "COLUMN=UNIT", value_parser = pair, conflicts_with = "map")]
+    unit: Vec<(String, String)>,
+    /// A line for the head of the recording, such as 'workpiece_frame: unknown'
+    #[arg(long, value_name = "KEY: VALUE", conflicts_with = "map")]
+    head: Vec<String>,
+    /// Takes only the rows that have this text in this column
+    #[arg(long = "where", value_name = "COLUMN=TEXT", value_parser = pair, conflicts_with = "map")]
+    rows: Vec<(String, String)>,
+    /// Names of all columns with their units, where the table has no headings
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', conflicts_with = "map")]
+    names: Vec<String>,
+    /// Takes only this marker, where a row has several
+    #[arg(long, value_name = "NAME", conflicts_with = "map")]
+    marker: Vec<String>,
+    /// Convention of Euler angles: zyx-intrinsic, xyz-fixed, ..., rpy, kuka, fanuc
+    #[arg(long, value_name = "CONVENTION", conflicts_with = "map")]
+    euler: Option<String>,
+    /// Columns rx, ry, rz are a rotation vector and no Euler angles
+    #[arg(long, conflicts_with_all = ["map", "euler"])]
+    rotation_vector: bool,
+    /// Order of a matrix that does not tell it: row-major or column-major
+    #[arg(long, value_name = "ORDER", value_parser = ["row-major", "column-major"], conflicts_with = "map")]
+    matrix: Option<String>,
+    /// Time stamp at which t is 0; the first one where stamps count from 1970 or are dates
+    #[arg(long, value_name = "STAMP", conflicts_with = "map")]
+    time_zero: Option<String>,
+    /// The joint that a file of a laser is about
+    #[arg(long, value_name = "JOINT")]
+    joint: Option<String>,
+    /// From which side the targets of a laser were approached, where the file does not tell
+    #[arg(long, value_name = "HOW", value_parser = ["alternating", "rising", "falling"])]
+    approach: Option<String>,
+    /// What the deviations of a laser are
+    #[arg(long, value_name = "SENSE", value_parser = ["laser-minus-target", "target-minus-laser"])]
+    deviation: Option<String>,
+    /// What separates columns: comma, semicolon, tab or blanks; found by itself
+    #[arg(long, value_name = "WORD", conflicts_with = "map")]
+    separator: Option<String>,
+    /// Decimal sign: point or comma; found by itself
+    #[arg(long, value_name = "WORD", conflicts_with = "map")]
+    decimal: Option<String>,
+    /// Where to write the recording; of several markers each gets its name: REC_MARKER.csv
+    #[arg(short, long, value_name = "REC.csv")]
+    output: Output,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// `KEY=VALUE` at the first sign of equality.
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("write it as NAME=VALUE")?;
+    if key.trim().is_empty() || value.trim().is_empty() {
+        return Err("nothing stands on one side of `=`".into());
+    }
+    Ok((key.trim().into(), value.trim().into()))
+}
+
+impl Args {
+    fn request(&self) -> Request {
+        Request {
+            map: self.map.clone(),
+            measurement: self.measurement.clone(),
+            columns: self.column.clone(),
+            units: self.unit.clone(),
+            head: self.head.clone(),
+            rows: self.rows.iter().cloned().collect(),
+            names: self.names.clone(),
+            markers: self.marker.clone(),
+            euler: self.euler.clone(),
+            rotation_vector: self.rotation_vector,
+            matrix: self.matrix.clone(),
+            time_zero: self.time_zero.clone(),
+            joint: self.joint.clone(),
+            approach: self.approach.clone(),
+            deviation: self.deviation.clone(),
+            separator: self.separator.clone(),
+            decimal: self.decimal.clone(),
+        }
+    }
+}
+
+/// The file of one recording: the marker's name before the ending.
+fn path_of(output: &Path, recording: &Written) -> PathBuf {
+    let Some(marker) = &recording.marker else { return output.to_path_buf() };
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy();
+    let end = output.extension().map_or(String::new(), |e| format!(".{}", e.to_string_lossy()));
+    let plain: String =
+        marker.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect();
+    output.with_file_name(format!("{stem}_{plain}{end}"))
+}
+
+pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
+    let machine =
+        (args.machine.as_ref()).map(|path| open_machine(path, |path| Machine::open(path))).transpose()?;
+    let converted = open(&args.file, machine.as_ref(), &args.request())?;
+    let paths: Vec<PathBuf> = converted.recordings.iter().map(|r| path_of(&args.output, r)).collect();
+    // The names of several come from the markers, and are seen only now.
+    files.with_outputs("--output", &paths).check()?;
+    if let Some(twice) = (1..paths.len()).find(|i| paths[..*i].contains(&paths[*i])) {
+        return Err(Failure::Told {
+            what: format!("{}: two markers would be written into this file", paths[twice].display()),
+            mend: "take one by `--marker`, or rename them in a map".into(),
+        });
+    }
+    let write = |path: &Path, text: &str| {
+        write_whole(path, |out| {
+            // Watched: an error here is told of the output.
+            let _ = out.write_all(text.as_bytes());
+            Ok(())
+        })
+    };
+    for (path, recording) in paths.iter().zip(&converted.recordings) {
+        write(path, &recording.text)?;
+    }
+    if let Some(path) = &args.write_map {
+        write(path, &converted.map)?;
+    }
+    let mut text = String::new();
+    if args.map.is_none() && args.write_map.is_none() {
+        text.push_str(&converted.map);
+    } else {
+        text.extend(converted.told.iter().map(|line| format!("{line}\n")));
+    }
+    for (path, recording) in paths.iter().zip(&converted.recordings) {
+        let gaps = match recording.with_gaps {
+            0 => String::new(),
+            n => format!(", {n} with a field that is missing"),
+        };
+        text.push_str(&format!(
+            "{}{gaps} written to {}\n",
+            count(recording.rows, "row", "rows"),
+            path.display()
+        ));
+    }
+    args.common.say(&text)?;
+    let recordings: Vec<_> = paths
+        .iter()
+        .zip(&converted.recordings)
+        .map(|(path, r)| {
+            json!({"file": path.to_string_lossy(), "marker": r.marker, "rows": r.rows, "with_gaps": r.with_gaps})
+        })
+        .collect();
+    args.common.write_json(&json!({"recordings": recordings, "map": converted.map, "told": converted.told}))
+}

@@ -1,0 +1,176 @@
+//! Recordings from tables of other programs: trackers, controls, loggers, spreadsheets.
+//!
+//! [`open`] reads a table, finds out from its headings what its columns are, and writes a recording of each marker in it. What headings do
+//! not say is not guessed: an error lists what has to be told. A [`Map`] says all of it; `docs/convert.md`.
+
+mod cell;
+mod draft;
+mod form;
+mod groups;
+mod guess;
+mod heading;
+mod joints;
+mod map;
+mod matrix;
+mod measured;
+mod moment;
+mod npy;
+mod plan;
+mod renishaw;
+mod rotation;
+mod table;
+mod target;
+mod text;
+mod unit;
+mod write;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+pub use map::{Map, Part};
+pub use write::Written;
+
+use crate::error::{Error, Place, Result};
+use crate::machine::Machine;
+use map::Known;
+use table::{Table, Told};
+
+/// What is known of a table besides what it says itself.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Request {
+    /// The file of a map, which then says everything; the fields below, but for the joint, are not asked.
+    pub map: Option<PathBuf>,
+    /// What was measured: `position`, `pose`, `joint`, `distance` or `displacement`.
+    pub measurement: Option<String>,
+    /// Columns of the recording and the columns of the table that they are; `q*` for all joints of such names.
+    pub columns: Vec<(String, String)>,
+    /// Units by column of the table, or by `length`, `angle`, `time` for all that name none.
+    pub units: Vec<(String, String)>,
+    /// Lines `key: value` for the head of the recording.
+    pub head: Vec<String>,
+    /// Columns and the text that a row must have there to be taken.
+    pub rows: BTreeMap<String, String>,
+    /// Names of all columns, in the place of headings.
+    pub names: Vec<String>,
+    /// Markers that are taken, where a row has several; all where none is named.
+    pub markers: Vec<String>,
+    /// Convention of Euler angles, such as `zyx-intrinsic`.
+    pub euler: Option<String>,
+    /// Whether `rx ry rz` are a rotation vector.
+    pub rotation_vector: bool,
+    /// `row-major` or `column-major`, where a matrix does not tell by itself.
+    pub matrix: Option<String>,
+    /// Time stamp at which `t` is 0.
+    pub time_zero: Option<String>,
+    /// The joint that a file of a laser is about.
+    pub joint: Option<String>,
+    /// From which side the targets of a laser were approached: `alternating`, `rising` or `falling`.
+    pub approach: Option<String>,
+    /// What deviations of a laser are: `laser-minus-target`, or `target-minus-laser`.
+    pub deviation: Option<String>,
+    /// What separates columns: `comma`, `semicolon`, `tab`, `blanks`.
+    pub separator: Option<String>,
+    /// `point` or `comma`.
+    pub decimal: Option<String>,
+}
+
+/// Recordings that were made of a table.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq)]
+pub struct Converted {
+    /// One for each marker.
+    pub recordings: Vec<Written>,
+    /// The map that made them, as a file.
+    pub map: String,
+    /// What was guessed or left out, one sentence each.
+    pub told: Vec<String>,
+}
+
+/// Reads the table at `path`.
+///
+/// # Errors
+/// As [`read`], and [`Error::File`].
+pub fn open(path: impl AsRef<Path>, machine: Option<&Machine>, request: &Request) -> Result<Converted> {
+    let path = path.as_ref();
+    let bytes = std::fs::read(path).map_err(|source| Error::file(path, source))?;
+    read(path, &bytes, machine, request)
+}
+
+/// Reads a table; `file` is only the name that messages use. Without a map the machine's joints say which columns are looked for; with a
+/// machine what was written is read back.
+///
+/// ```
+/// use kincal::Machine;
+/// use kincal::convert::{Request, read};
+///
+/// let machine = Machine::parse("slide.ron", r#"Machine(
+///     name: "slide", units: (length: mm, angle: deg), workpiece: [(frame: "w")],
+///     tool: [(frame: "x", joint: Prismatic(axis: "x")), (frame: "t", at: (0, 0, 80))],
+/// )"#)?;
+/// let table = b"Time (ms);X_cmd (mm);X_act (mm)\n0;100,5;100,512\n10;200,5;200,498\n";
+/// let converted = read("log.csv", table, Some(&machine), &Request::default())?;
+/// assert_eq!(
+///     converted.recordings[0].text,
+///     "# machine: slide\n# measurement: joint\nt[ms],x[mm],x_meas[mm]\n0,100.5,100.512\n10,200.5,200.498\n"
+/// );
+/// # Ok::<(), kincal::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Input`] with line and column: a table without form, what is no number, all that has to be told.
+pub fn read(
+    file: impl AsRef<Path>,
+    bytes: &[u8],
+    machine: Option<&Machine>,
+    request: &Request,
+) -> Result<Converted> {
+    let file = file.as_ref();
+    let flag = |name: &str, (what, mend): (String, String)| {
+        Error::mistake(Place::file(file), format!("--{name}: {what}"), mend)
+    };
+    let known = request.map.as_ref().map(|path| Known::open(path)).transpose()?;
+    let told = match &known {
+        Some(known) => {
+            let (separator, decimal_comma) = known.form()?;
+            Told { separator, decimal_comma, names: known.map.names.clone() }
+        }
+        None => Told {
+            separator: (request.separator.as_deref())
+                .map(|word| map::separator(word).map_err(|e| flag("separator", e)))
+                .transpose()?,
+            decimal_comma: (request.decimal.as_deref())
+                .map(|word| map::decimal(word).map_err(|e| flag("decimal", e)))
+                .transpose()?,
+            names: request.names.clone(),
+        },
+    };
+    let (table, laser) = if renishaw::is_one(file, bytes) {
+        let (table, map, notes) = renishaw::read(file, bytes, machine, request)?;
+        (table, Some((map, notes)))
+    } else if bytes.starts_with(npy::MAGIC) {
+        (npy::read(file, bytes, &told)?, None)
+    } else {
+        (Table::read(file, bytes, &told)?, None)
+    };
+    let (known, mut told) = match (known, machine) {
+        (Some(known), _) => (known, Vec::new()),
+        _ if laser.is_some() => {
+            let (map, notes) = laser.unwrap_or_default();
+            (Known::guessed(map, file), notes)
+        }
+        (None, Some(machine)) => {
+            let (map, told) = guess::map(&table, machine, request)?;
+            (Known::guessed(map, file), told)
+        }
+        (None, None) => {
+            let what = "neither a machine nor a map says what the columns are";
+            let mend = "give the machine whose joints are in the table, `--machine MACHINE.ron`, or a map, `--map MAP.ron`";
+            return Err(Error::mistake(Place::file(file), what, mend));
+        }
+    };
+    if machine.is_none() {
+        told.push("not read back: `--machine` would say whether it is a recording of that machine".into());
+    }
+    let recordings = write::all(&known, &table, machine, &mut told)?;
+    Ok(Converted { recordings, map: known.map.ron(&told), told })
+}
