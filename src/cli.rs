@@ -7,6 +7,7 @@ mod compensate;
 mod demo;
 mod describe;
 mod diagnose;
+mod export;
 mod failure;
 mod files;
 mod import;
@@ -61,6 +62,8 @@ enum Command {
     Simulate(Box<simulate::Args>),
     /// A machine file from a URDF file
     Import(import::Args),
+    /// A calibrated machine as ISO 230-1 table, URDF, DH table, parameters of a control or compensation table
+    Export(export::Args),
     /// The machines that come with the program, or the file of one of them
     Machines(machines::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
@@ -117,6 +120,7 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Verify(args) => verify::run(args),
         Command::Simulate(args) => simulate::run(args, files),
         Command::Import(args) => import::run(args),
+        Command::Export(args) => export::run(args),
         Command::Machines(args) => machines::run(args),
         Command::Demo(args) => demo::run(args),
     }

@@ -1,0 +1,134 @@
+//! Calibrated machines in the forms of others: ISO 230-1 tables, URDF, DH tables, parameters of controls, compensation tables.
+//!
+//! Every form is a file that is written whole, with the numbers that stand in it and with what it cannot hold. A number that the
+//! recordings did not determine is never among those to be entered; it is listed with the reason. `docs/export.md` has the conventions.
+
+mod curve;
+mod iso230;
+mod known;
+mod numbers;
+mod table;
+mod travel;
+mod varying;
+
+use std::fmt;
+
+use serde::Serialize;
+
+use crate::calibration::CalibratedMachine;
+use crate::error::{Error, Result};
+
+/// The form of an exported file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Location errors under their names of ISO 230-1, a CSV table.
+    Iso230,
+    /// Position errors of every joint over its travel, both directions, a CSV table.
+    Table,
+}
+
+/// All formats with the word that names each.
+pub const FORMATS: [(Format, &str); 2] = [(Format::Iso230, "iso230"), (Format::Table, "table")];
+
+impl Format {
+    /// The format of this name.
+    pub fn named(name: &str) -> Option<Format> {
+        FORMATS.into_iter().find(|(_, own)| *own == name).map(|(format, _)| format)
+    }
+
+    /// Its name, as `--to` takes it.
+    pub fn name(self) -> &'static str {
+        FORMATS.into_iter().find(|(format, _)| *format == self).map_or("", |(_, name)| name)
+    }
+}
+
+impl fmt::Display for Format {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What an export needs besides the calibrated machine.
+#[non_exhaustive]
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Length of the tool that frame `t` is the tip of, from the gauge line of the spindle, m.
+    pub tool_length: f64,
+}
+
+/// A number as it stands in an exported file.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Number {
+    /// Its name there.
+    pub name: String,
+    /// The calibrated value in `unit`; nothing where the recordings do not determine it.
+    pub value: Option<f64>,
+    /// What the machine file as declared would give, in `unit`.
+    pub declared: f64,
+    /// `mm`, `deg`, `um`, `urad` or `1`.
+    pub unit: String,
+    /// Why there is no value.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub because: Option<String>,
+}
+
+/// Something about the calibrated machine that the format cannot hold.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Remainder {
+    /// What it is.
+    pub what: String,
+    /// Largest error that it leaves at the tool over the travel, m; nothing where that is not known.
+    pub max_m: Option<f64>,
+    /// Root mean square of the same, m.
+    pub rms_m: Option<f64>,
+    /// Why it stays out, or what takes it.
+    pub because: String,
+}
+
+/// A calibrated machine in another form.
+#[non_exhaustive]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Exported {
+    /// The file.
+    #[serde(skip)]
+    pub text: String,
+    /// The numbers in it.
+    pub numbers: Vec<Number>,
+    /// What it does not hold, with what that leaves at the tool.
+    pub left_out: Vec<Remainder>,
+    /// What was chosen or has to be known, one sentence each.
+    pub told: Vec<String>,
+}
+
+/// Writes a calibrated machine in another form.
+///
+/// ```
+/// use kincal::CalibratedMachine;
+/// use kincal::export::{Format, Options, export};
+///
+/// let mill = CalibratedMachine::parse("mill.ron", r#"Machine(
+///     name: "mill", units: (length: mm, angle: deg), workpiece: [(frame: "w")],
+///     tool: [(frame: "x", joint: Prismatic(axis: "x", travel: (0, 500))), (frame: "y", joint: Prismatic(axis: "y", travel: (0, 300))), (frame: "t")],
+///     calibration: (deviations: [(frame: "y", v: (0, 0, 0), w: (0, 0, 0.01))], unseen: []),
+/// )"#)?;
+/// let file = export(&mill, Format::Iso230, &Options::default())?;
+/// assert!(file.text.contains("EC0Y,174.532925,urad"));
+/// # Ok::<(), kincal::Error>(())
+/// ```
+///
+/// # Errors
+/// [`Error::Undetermined`] where the machine holds nothing that the format could, or is of a kind that it does not know.
+pub fn export(calibrated: &CalibratedMachine, format: Format, options: &Options) -> Result<Exported> {
+    let _ = options;
+    match format {
+        Format::Iso230 => iso230::write(calibrated),
+        Format::Table => table::write(calibrated),
+    }
+}
+
+/// The machine is of a kind that the format does not hold.
+fn refused(what: impl Into<String>, mend: impl Into<String>) -> Error {
+    Error::Undetermined { what: what.into(), mend: mend.into() }
+}
