@@ -9,14 +9,17 @@ mod known;
 mod numbers;
 mod table;
 mod travel;
+mod urdf;
 mod varying;
 
 use std::fmt;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use crate::calibration::CalibratedMachine;
-use crate::error::{Error, Result};
+use crate::error::{Error, Place, Result};
+use crate::import::Ends;
 
 /// The form of an exported file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,10 +28,13 @@ pub enum Format {
     Iso230,
     /// Position errors of every joint over its travel, both directions, a CSV table.
     Table,
+    /// A robot description, m and rad: a new one, or the origins of [`Options::base_file`].
+    Urdf,
 }
 
 /// All formats with the word that names each.
-pub const FORMATS: [(Format, &str); 2] = [(Format::Iso230, "iso230"), (Format::Table, "table")];
+pub const FORMATS: [(Format, &str); 3] =
+    [(Format::Iso230, "iso230"), (Format::Table, "table"), (Format::Urdf, "urdf")];
 
 impl Format {
     /// The format of this name.
@@ -54,6 +60,40 @@ impl fmt::Display for Format {
 pub struct Options {
     /// Length of the tool that frame `t` is the tip of, from the gauge line of the spindle, m.
     pub tool_length: f64,
+    /// The description that the machine was imported from, for [`Format::Urdf`].
+    pub base_file: Option<BaseFile>,
+}
+
+/// A description whose origins are written anew.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BaseFile {
+    /// Its path, or the name that messages use.
+    pub file: PathBuf,
+    /// Its text.
+    pub text: String,
+    /// The ends of the chain, as the machine was imported.
+    pub ends: Ends,
+}
+
+impl BaseFile {
+    /// Reads a description.
+    ///
+    /// # Errors
+    /// [`Error::File`], or [`Error::Input`] where it is not UTF-8.
+    pub fn open(path: impl AsRef<Path>, ends: Ends) -> Result<BaseFile> {
+        let file = path.as_ref().to_path_buf();
+        let bytes = std::fs::read(&file).map_err(|source| Error::file(&file, source))?;
+        let text = String::from_utf8(bytes).map_err(|error| {
+            let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let line = valid.iter().filter(|b| **b == b'\n').count() + 1;
+            Error::mistake(
+                Place::at(&file, line, 0),
+                "this line is not UTF-8",
+                "save the file as UTF-8: its bytes are kept as they are",
+            )
+        })?;
+        Ok(BaseFile { file, text, ends })
+    }
 }
 
 /// A number as it stands in an exported file.
@@ -121,10 +161,13 @@ pub struct Exported {
 /// # Errors
 /// [`Error::Undetermined`] where the machine holds nothing that the format could, or is of a kind that it does not know.
 pub fn export(calibrated: &CalibratedMachine, format: Format, options: &Options) -> Result<Exported> {
-    let _ = options;
     match format {
         Format::Iso230 => iso230::write(calibrated),
         Format::Table => table::write(calibrated),
+        Format::Urdf => match &options.base_file {
+            Some(base) => urdf::patched(calibrated, &base.file, &base.text, &base.ends),
+            None => urdf::write(calibrated),
+        },
     }
 }
 

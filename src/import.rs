@@ -5,10 +5,13 @@
 
 mod chain;
 mod names;
+mod origins;
 mod step;
 mod urdf;
 mod write;
 mod xml;
+
+pub(crate) use origins::{Edit, Held, Origin, origins};
 
 use std::path::Path;
 
@@ -66,7 +69,11 @@ pub fn open(path: impl AsRef<Path>, ends: &Ends) -> Result<Imported> {
 pub fn read(file: impl AsRef<Path>, text: &str, ends: &Ends) -> Result<Imported> {
     let file = file.as_ref();
     let robot = urdf::read(file, text)?;
-    let chain = chain::cut(&robot, ends)?;
+    machine_of(file, chain::cut(&robot, ends)?)
+}
+
+/// The machine that a chain is.
+fn machine_of(file: &Path, chain: chain::Chain) -> Result<Imported> {
     let text = write::ron(file, &chain);
     // What a machine file cannot hold is told by the reader of machine files, of the place in the robot's file.
     let machine = Machine::parse(file, &text).map_err(|error| {

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use crate::calibration::CalibratedMachine;
-use crate::export::{Exported, FORMATS, Format, Options, export};
+use crate::export::{BaseFile, Exported, FORMATS, Format, Options, export};
+use crate::import::Ends;
 use crate::units::{Quantity, amount};
 
 use super::Common;
@@ -23,6 +24,15 @@ pub(crate) struct Args {
     /// Length of the tool that frame t is the tip of, as the control's tool table has it, such as 120mm
     #[arg(long, value_name = "LENGTH", default_value = "0mm", value_parser = |text: &str| amount(text, Quantity::Length))]
     tool_length: f64,
+    /// urdf: the file that the machine was imported from; its origins are written anew, every other byte is kept
+    #[arg(long, value_name = "ROBOT.urdf")]
+    base_file: Option<PathBuf>,
+    /// urdf: link that carries the workpiece, as for import
+    #[arg(long, value_name = "LINK", requires = "base_file")]
+    base: Option<String>,
+    /// urdf: link that is the tool, as for import
+    #[arg(long, value_name = "LINK", requires = "base_file")]
+    tip: Option<String>,
     /// Where to write the file; printed where nothing is said
     #[arg(short, long, value_name = "FILE")]
     output: Option<Output>,
@@ -35,6 +45,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let format = Format::named(&args.to).unwrap_or(Format::Iso230);
     let mut options = Options::default();
     options.tool_length = args.tool_length;
+    if let Some(file) = &args.base_file {
+        let ends = Ends { base: args.base.clone(), tip: args.tip.clone() };
+        options.base_file = Some(BaseFile::open(file, ends)?);
+    }
     let exported = export(&calibrated, format, &options)?;
     match &args.output {
         Some(output) => {

@@ -1,6 +1,8 @@
 //! What of a number the recordings have determined, as the calibrated file tells it.
 
+use super::travel::poses;
 use crate::calibration::CalibratedMachine;
+use crate::chain::Chain;
 use crate::lie::Twist;
 use crate::location::{Functional, Knowledge};
 
@@ -99,4 +101,33 @@ impl Knowledge for Known<'_> {
         let unseen = if prior_variance > 0.0 { open / prior_variance } else { 0.0 };
         Functional { prior_variance, posterior_variance: open, unseen }
     }
+}
+
+/// What the recordings left open, as it may be at the tip of the tool.
+pub(super) fn open_at_tool(calibrated: &CalibratedMachine) -> Option<String> {
+    let patterns = calibrated.unseen().filter(|patterns| !patterns.is_empty())?;
+    let machine = calibrated.machine();
+    let chain = calibrated.chain();
+    let mut worst: f64 = 0.0;
+    let moved: Vec<Chain<f64>> = patterns
+        .iter()
+        .map(|pattern| {
+            let dh: Vec<_> = calibrated.deviations().iter().zip(pattern).map(|(dh, by)| *dh + *by).collect();
+            Chain::new(machine, &dh)
+        })
+        .collect();
+    for q in poses(calibrated, 50) {
+        let tip = chain.w_from_t(&q).translation;
+        let squares = moved.iter().map(|m| (m.w_from_t(&q).translation - tip).norm().powi(2));
+        worst = worst.max(squares.sum::<f64>().sqrt());
+    }
+    Some(format!(
+        "the recordings left {} of the deviations open, which stand at what the tolerances make likely: up to {} um at the tip over the travel (one standard deviation)",
+        if patterns.len() == 1 {
+            "one combination".to_string()
+        } else {
+            format!("{} combinations", patterns.len())
+        },
+        (worst * 1e7).round() / 10.0
+    ))
 }
