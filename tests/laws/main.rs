@@ -15,6 +15,7 @@ mod compensate;
 mod effects;
 mod effects_in_files;
 mod features;
+mod export;
 mod import;
 mod interface;
 mod inverse;
