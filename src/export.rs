@@ -3,14 +3,21 @@
 //! Every form is a file that is written whole, with the numbers that stand in it and with what it cannot hold. A number that the
 //! recordings did not determine is never among those to be entered; it is listed with the reason. `docs/export.md` has the conventions.
 
+mod compensation;
+mod control;
 mod curve;
+mod dh;
+mod heidenhain;
 mod iso230;
 mod known;
+mod lines;
+mod linuxcnc;
 mod numbers;
 mod table;
 mod travel;
 mod urdf;
 mod varying;
+mod vectors;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -30,11 +37,38 @@ pub enum Format {
     Table,
     /// A robot description, m and rad: a new one, or the origins of [`Options::base_file`].
     Urdf,
+    /// Denavit-Hartenberg parameters, standard convention.
+    Dh,
+    /// The same, modified convention (Craig).
+    Mdh,
+    /// Pins of a LinuxCNC kinematics module, and INI lines.
+    LinuxCnc,
+    /// One axis as LinuxCNC's `COMP_FILE`.
+    LinuxCncComp,
+    /// SINUMERIK: vectors of the tool carrier and of the five-axis transformation.
+    Siemens,
+    /// SINUMERIK: a part program that fills the table of encoder compensation.
+    EncComp,
+    /// HEIDENHAIN: what the kinematics cycles should find.
+    Heidenhain,
+    /// FANUC: vectors of tool centre point control.
+    Fanuc,
 }
 
 /// All formats with the word that names each.
-pub const FORMATS: [(Format, &str); 3] =
-    [(Format::Iso230, "iso230"), (Format::Table, "table"), (Format::Urdf, "urdf")];
+pub const FORMATS: [(Format, &str); 11] = [
+    (Format::Urdf, "urdf"),
+    (Format::Dh, "dh"),
+    (Format::Mdh, "mdh"),
+    (Format::LinuxCnc, "linuxcnc"),
+    (Format::LinuxCncComp, "linuxcnc-comp"),
+    (Format::Siemens, "siemens"),
+    (Format::EncComp, "enc-comp"),
+    (Format::Heidenhain, "heidenhain"),
+    (Format::Fanuc, "fanuc"),
+    (Format::Iso230, "iso230"),
+    (Format::Table, "table"),
+];
 
 impl Format {
     /// The format of this name.
@@ -60,6 +94,8 @@ impl fmt::Display for Format {
 pub struct Options {
     /// Length of the tool that frame `t` is the tip of, from the gauge line of the spindle, m.
     pub tool_length: f64,
+    /// The axis of [`Format::LinuxCncComp`]; the only one that has position errors where nothing is said.
+    pub axis: Option<String>,
     /// The description that the machine was imported from, for [`Format::Urdf`].
     pub base_file: Option<BaseFile>,
 }
@@ -106,7 +142,7 @@ pub struct Number {
     pub value: Option<f64>,
     /// What the machine file as declared would give, in `unit`.
     pub declared: f64,
-    /// `mm`, `deg`, `um`, `urad` or `1`.
+    /// `mm`, `um`, `m`, `urad`, `rad` or `1`.
     pub unit: String,
     /// Why there is no value.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -168,6 +204,14 @@ pub fn export(calibrated: &CalibratedMachine, format: Format, options: &Options)
             Some(base) => urdf::patched(calibrated, &base.file, &base.text, &base.ends),
             None => urdf::write(calibrated),
         },
+        Format::Dh => dh::write(calibrated, false),
+        Format::Mdh => dh::write(calibrated, true),
+        Format::LinuxCnc => linuxcnc::write(calibrated, options),
+        Format::LinuxCncComp => compensation::comp_file(calibrated, options),
+        Format::Siemens => vectors::siemens(calibrated, options),
+        Format::EncComp => compensation::enc_comp(calibrated),
+        Format::Heidenhain => heidenhain::write(calibrated, options),
+        Format::Fanuc => vectors::fanuc(calibrated, options),
     }
 }
 

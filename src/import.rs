@@ -11,12 +11,12 @@ mod urdf;
 mod write;
 mod xml;
 
-pub(crate) use origins::{Edit, Held, Origin, origins};
-
 use std::path::Path;
 
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
+
+pub(crate) use origins::{Edit, Held, origins};
 
 /// Which part of a description becomes the machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -24,6 +24,9 @@ pub(crate) struct Args {
     /// Length of the tool that frame t is the tip of, as the control's tool table has it, such as 120mm
     #[arg(long, value_name = "LENGTH", default_value = "0mm", value_parser = |text: &str| amount(text, Quantity::Length))]
     tool_length: f64,
+    /// linuxcnc-comp: the axis, where several have position errors
+    #[arg(long, value_name = "JOINT")]
+    axis: Option<String>,
     /// urdf: the file that the machine was imported from; its origins are written anew, every other byte is kept
     #[arg(long, value_name = "ROBOT.urdf")]
     base_file: Option<PathBuf>,
@@ -45,6 +48,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let format = Format::named(&args.to).unwrap_or(Format::Iso230);
     let mut options = Options::default();
     options.tool_length = args.tool_length;
+    options.axis.clone_from(&args.axis);
     if let Some(file) = &args.base_file {
         let ends = Ends { base: args.base.clone(), tip: args.tip.clone() };
         options.base_file = Some(BaseFile::open(file, ends)?);

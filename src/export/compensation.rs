@@ -33,7 +33,8 @@ fn programmed(machine: &Machine, curve: &Curve) -> Programmed {
         values
     };
     // Forward in the program is backward of the joint where the signs differ.
-    let (up, down) = if sign < 0.0 { (&curve.backward, &curve.forward) } else { (&curve.forward, &curve.backward) };
+    let (up, down) =
+        if sign < 0.0 { (&curve.backward, &curve.forward) } else { (&curve.forward, &curve.backward) };
     Programmed {
         positions: scaled(&curve.positions),
         forward: scaled(up),
@@ -58,7 +59,10 @@ pub(super) fn comp_file(calibrated: &CalibratedMachine, options: &Options) -> Re
             [only] => only,
             _ => {
                 return Err(refused(
-                    format!("LinuxCNC reads one file an axis, and {} axes have position errors", curves.len()),
+                    format!(
+                        "LinuxCNC reads one file an axis, and {} axes have position errors",
+                        curves.len()
+                    ),
                     format!("name by --axis one of: {}", names.join(", ")),
                 ));
             }
@@ -67,14 +71,18 @@ pub(super) fn comp_file(calibrated: &CalibratedMachine, options: &Options) -> Re
     let own = programmed(machine, chosen);
     let name = &machine.commands()[chosen.command];
     let told = vec![
-        format!("COMP_FILE of axis {name}, COMP_FILE_TYPE = 0: commanded position, then where the axis really is, forward and backward, {}", own.unit),
+        format!(
+            "COMP_FILE of axis {name}, COMP_FILE_TYPE = 0: commanded position, then where the axis really is, forward and backward, {}",
+            own.unit
+        ),
         "it holds play as well: leave BACKLASH of this joint at 0".to_string(),
         "look at one position with an indicator before and after: the error must become smaller".to_string(),
     ];
     let mut text = String::new();
     for i in 0..own.positions.len().min(MOST) {
         let at = own.positions[i];
-        let _ = writeln!(text, "{} {} {}", fixed(at), fixed(at + own.forward[i]), fixed(at + own.backward[i]));
+        let _ =
+            writeln!(text, "{} {} {}", fixed(at), fixed(at + own.forward[i]), fixed(at + own.backward[i]));
     }
     Ok(Exported { text, numbers: Vec::new(), left_out: left_out(&curves), told })
 }
@@ -96,7 +104,8 @@ pub(super) fn enc_comp(calibrated: &CalibratedMachine) -> Result<Exported> {
         let joint = machine.command_joint(curve.command);
         let address = joint.nc_word().address;
         let axis = if address.len() == 1 { format!("{address}1") } else { address };
-        let half = 0.5 * curve.backlash().abs() * if joint.kind == JointKind::Revolute { DEG } else { MM }.per_si;
+        let half =
+            0.5 * curve.backlash().abs() * if joint.kind == JointKind::Revolute { DEG } else { MM }.per_si;
         if half > 1e-6 {
             told.push(format!(
                 "axis {axis} besides has {} {} of play in the mean, which ENC_COMP cannot hold",

@@ -141,7 +141,9 @@ impl<'a> Seen<'a> {
     /// The tool length that the numbers go with.
     pub fn tool_sentence(&self) -> String {
         let mm = super::numbers::exact((self.tool_length * 1e6).round() / 1e3);
-        format!("places are counted from the gauge line with all axes at zero; the tip t is {mm} mm below it (--tool-length), as the tool table must have it")
+        format!(
+            "places are counted from the gauge line with all axes at zero; the tip t is {mm} mm below it (--tool-length), as the tool table must have it"
+        )
     }
 }
 
@@ -178,9 +180,7 @@ fn layout(machine: &Machine) -> std::result::Result<Layout, String> {
     }
     let [Some(x), Some(y), Some(z)] = linear else { return Err("it has not all of X, Y and Z".into()) };
     let layout = Layout { linear: [x, y, z], part, tool, names, signs };
-    let inner = |i: &usize| {
-        layout.part.iter().all(|(p, _)| p < i) && layout.tool.iter().all(|(t, _)| t > i)
-    };
+    let inner = |i: &usize| layout.part.iter().all(|(p, _)| p < i) && layout.tool.iter().all(|(t, _)| t > i);
     if !layout.linear.iter().all(inner) {
         return Err("a linear axis stands beyond a rotary one".into());
     }

@@ -45,10 +45,10 @@ struct Table {
 
 impl Table {
     fn new(lines: &Lines) -> Table {
-        let w_from_first = lines.lines.first().map_or(Pose::identity(0.0), |line| Pose {
-            rotation: turned_z(line.u),
-            translation: line.p,
-        });
+        let w_from_first = lines
+            .lines
+            .first()
+            .map_or(Pose::identity(0.0), |line| Pose { rotation: turned_z(line.u), translation: line.p });
         let mut here = w_from_first;
         let mut rows: Vec<Row> = Vec::new();
         for (i, _) in lines.lines.iter().enumerate() {
@@ -133,7 +133,8 @@ pub(super) fn write(calibrated: &CalibratedMachine, modified: bool) -> Result<Ex
     ];
     told.extend(super::known::Known::new(calibrated).sentence());
     told.extend(super::known::open_at_tool(calibrated));
-    let form = if modified { "modified Denavit-Hartenberg parameters" } else { "Denavit-Hartenberg parameters" };
+    let form =
+        if modified { "modified Denavit-Hartenberg parameters" } else { "Denavit-Hartenberg parameters" };
     let mut text = format!("# {}\n", heading(machine.name(), form));
     told.iter().for_each(|line| text.push_str(&format!("# {line}\n")));
     let placed = |pose: Pose<f64>| {

@@ -114,7 +114,14 @@ const FANUC: Control = Control {
             name: "19680 = 2 (two rotary axes of the tool)",
             vectors: &[
                 vector("19709..19711", "", 19709, "", "tool axis to tool rotary axis", &[(1.0, 1)]),
-                vector("19712..19714", "", 19712, "", "second to first tool rotary axis", &[(1.0, 0), (-1.0, 1)]),
+                vector(
+                    "19712..19714",
+                    "",
+                    19712,
+                    "",
+                    "second to first tool rotary axis",
+                    &[(1.0, 0), (-1.0, 1)],
+                ),
             ],
         },
         Kind {
@@ -157,7 +164,8 @@ pub(super) fn fanuc(calibrated: &CalibratedMachine, options: &Options) -> Result
 fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
     let seen = Seen::new(calibrated, options, control.title)?;
     let layout = &seen.layout;
-    let Some(kind) = control.kinds.iter().find(|k| (k.part, k.tool) == (layout.part.len(), layout.tool.len()))
+    let Some(kind) =
+        control.kinds.iter().find(|k| (k.part, k.tool) == (layout.part.len(), layout.tool.len()))
     else {
         return Err(refused(
             format!(
@@ -189,7 +197,10 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
     };
     let (full, declared) = (seen.calibrated_lines(), seen.declared_lines());
     let (values, before, verdicts) = (all(&full), all(&declared), seen.judge(&all));
-    let mut exported = common(&seen, "this file holds constant geometry; `compensate` takes it, and --to enc-comp a part of it")?;
+    let mut exported = common(
+        &seen,
+        "this file holds constant geometry; `compensate` takes it, and --to enc-comp a part of it",
+    )?;
     exported.told.insert(0, format!("kind of machine: {}", kind.name));
     exported.told.extend(control.says.iter().map(|s| s.to_string()));
     let names: Vec<&str> = order.iter().map(|n| layout.names[axes[*n].0].as_str()).collect();
@@ -198,7 +209,12 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
     exported.told.iter().for_each(|line| text.push_str(&format!("{} {line}\n", control.comment)));
     let mut i = 0;
     let mut rows = |name: &str, first: &str, number: usize, also: &str, is: &str, unit: &str| {
-        let _ = writeln!(text, "{} {name}: {is}, {unit}{}{also}", control.comment, if also.is_empty() { "" } else { "; also " });
+        let _ = writeln!(
+            text,
+            "{} {name}: {is}, {unit}{}{also}",
+            control.comment,
+            if also.is_empty() { "" } else { "; also " }
+        );
         for k in 0..3 {
             let (value, was, verdict) = (values[i], before[i], verdicts[i]);
             i += 1;
@@ -207,12 +223,23 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
                 _ => format!("{first}{}[1]", number + k),
             };
             let because = (!verdict.is_determined()).then(|| {
-                format!("the recordings leave it open: it may be off by {} {unit} (one standard deviation)", fixed(verdict.open))
+                format!(
+                    "the recordings leave it open: it may be off by {} {unit} (one standard deviation)",
+                    fixed(verdict.open)
+                )
             });
             let axis = ["x", "y", "z"][k];
             let _ = match &because {
-                None => writeln!(text, "{place}={} {} {axis}, declared {}", fixed(value), control.comment, fixed(was)),
-                Some(because) => writeln!(text, "{} {place} ({axis}) is not entered: {because}", control.comment),
+                None => writeln!(
+                    text,
+                    "{place}={} {} {axis}, declared {}",
+                    fixed(value),
+                    control.comment,
+                    fixed(was)
+                ),
+                Some(because) => {
+                    writeln!(text, "{} {place} ({axis}) is not entered: {because}", control.comment)
+                }
             };
             exported.numbers.push(Number {
                 name: format!("{place} {name}.{axis}"),

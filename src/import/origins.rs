@@ -37,8 +37,6 @@ pub(crate) enum Edit {
 /// What leads to one frame of the machine.
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
-    /// The frame.
-    pub frame: String,
     /// Its joints in the file, from the frame before outwards; the last of them carries the frame.
     pub origins: Vec<Origin>,
     /// The offset of a mimic joint, behind all of them.
@@ -66,11 +64,7 @@ pub(crate) fn origins(file: &Path, text: &str, ends: &Ends) -> Result<(Imported,
             let edit = edit(&source, *node)?;
             Some(Origin { joint: step.name.clone(), line: step.line, parent_from_joint: pose, edit })
         });
-        Held {
-            frame: entry.frame.clone(),
-            origins: origins.collect(),
-            offset: entry.offset.unwrap_or(Pose::identity(0.0)),
-        }
+        Held { origins: origins.collect(), offset: entry.offset.unwrap_or(Pose::identity(0.0)) }
     };
     let all = frames(&chain).map(held).collect();
     Ok((machine_of(file, chain)?, all))

@@ -16,8 +16,10 @@ fn folder(name: &str) -> PathBuf {
 /// Every machine that comes with the program, with deviations of some tenths of a millimetre and a milliradian.
 fn machines() -> Vec<CalibratedMachine> {
     let mut rng = StdRng::seed_from_u64(7);
-    let mut names: Vec<PathBuf> =
-        std::fs::read_dir(folder("machines")).expect("a folder").map(|e| e.expect("readable").path()).collect();
+    let mut names: Vec<PathBuf> = std::fs::read_dir(folder("machines"))
+        .expect("a folder")
+        .map(|e| e.expect("readable").path())
+        .collect();
     names.sort();
     let calibrated = |path: PathBuf| {
         let machine = Machine::open(path).expect("a machine");
@@ -48,7 +50,11 @@ fn a_urdf_file_read_back_is_the_same_machine() {
     for calibrated in machines() {
         let machine = calibrated.machine();
         let Ok(exported) = export(&calibrated, Format::Urdf, &Options::default()) else {
-            assert!(machine.name().contains("justin") || machine.name().contains("jaibot"), "{}", machine.name());
+            assert!(
+                machine.name().contains("justin") || machine.name().contains("jaibot"),
+                "{}",
+                machine.name()
+            );
             continue;
         };
         let ends = Ends { base: Some("w".into()), tip: Some("t".into()) };
@@ -75,7 +81,10 @@ fn a_base_file_keeps_every_byte_but_its_origins() {
     for round in 0..3 {
         let text = match round {
             0 => text.clone(),
-            1 => format!("\u{feff}\n\n{}", text.replace("<link name=\"floor\"/>", "<link name=\"floor\"><x:y z:a=\"1\"/></link>")),
+            1 => format!(
+                "\u{feff}\n\n{}",
+                text.replace("<link name=\"floor\"/>", "<link name=\"floor\"><x:y z:a=\"1\"/></link>")
+            ),
             _ => text.replace("<origin xyz=\"0.3 0 0.05\"", "<origin").replace(" rpy=\"0.1 0.2 0.3\"", ""),
         };
         assert_ne!(text, before);
@@ -96,7 +105,7 @@ fn a_base_file_keeps_every_byte_but_its_origins() {
         let bare = |text: &str| -> String {
             let mut parts = text.split("<origin");
             let first = parts.next().unwrap_or_default().to_string();
-            parts.fold(first, |out, part| out + "|" + part.split_once('>').map_or("", |(_, rest)| rest))
+            parts.fold(first, |out, part| out + part.split_once('>').map_or("", |(_, rest)| rest))
         };
         assert_eq!(bare(&exported.text), bare(&text));
         // Without deviations every byte is as it was.
