@@ -10,6 +10,9 @@ use crate::location::{Functional, Knowledge};
 /// open: a tenth of the tolerances as a standard deviation.
 const OPEN: f64 = 0.01;
 
+/// What a number changes by less is rounding, in its own unit.
+const ROUNDING: f64 = 1e-11;
+
 /// What the file says of what its recordings have not seen.
 pub(super) struct Known<'a> {
     calibrated: &'a CalibratedMachine,
@@ -26,7 +29,7 @@ pub(super) struct Verdict {
 
 impl Verdict {
     pub fn is_determined(self) -> bool {
-        self.open * self.open <= OPEN * self.allowed * self.allowed
+        self.open * self.open <= OPEN * self.allowed * self.allowed + ROUNDING * ROUNDING
     }
 }
 

@@ -110,7 +110,7 @@ const MODULES: [Module; 5] = [
 ];
 
 /// Poses over which pins are fitted.
-const POSES: usize = 80;
+const POSES: usize = 40;
 
 /// A module on a machine.
 struct Fitted<'a> {

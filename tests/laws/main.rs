@@ -15,6 +15,7 @@ mod compensate;
 mod effects;
 mod effects_in_files;
 mod export;
+mod export_controls;
 mod features;
 mod import;
 mod interface;
