@@ -178,6 +178,29 @@ pub struct Exported {
     pub told: Vec<String>,
 }
 
+impl Exported {
+    /// What the file does not hold, as comments behind its first line, where the form has comments.
+    fn say_in_file(&mut self, format: Format) {
+        let mark = match format {
+            Format::Urdf | Format::LinuxCncComp => return,
+            Format::Siemens | Format::EncComp => ";",
+            _ => "#",
+        };
+        let um = |m: Option<f64>| m.map_or("size not known".to_string(), |m| format!("{:.1} um", 1e6 * m));
+        let line = |left: &Remainder| {
+            let sizes = match left.max_m {
+                Some(_) => format!("up to {}, RMS {}, at the tool tip", um(left.max_m), um(left.rms_m)),
+                None => um(None),
+            };
+            numbers::one_line(&format!("{mark} not in this file: {}: {sizes}; {}", left.what, left.because))
+                + "\n"
+        };
+        let lines: String = self.left_out.iter().map(line).collect();
+        let at = self.text.find('\n').map_or(self.text.len(), |at| at + 1);
+        self.text.insert_str(at, &lines);
+    }
+}
+
 /// Writes a calibrated machine in another form.
 ///
 /// ```
@@ -197,7 +220,7 @@ pub struct Exported {
 /// # Errors
 /// [`Error::Undetermined`] where the machine holds nothing that the format could, or is of a kind that it does not know.
 pub fn export(calibrated: &CalibratedMachine, format: Format, options: &Options) -> Result<Exported> {
-    match format {
+    let mut exported = match format {
         Format::Iso230 => iso230::write(calibrated),
         Format::Table => table::write(calibrated),
         Format::Urdf => match &options.base_file {
@@ -212,7 +235,9 @@ pub fn export(calibrated: &CalibratedMachine, format: Format, options: &Options)
         Format::EncComp => compensation::enc_comp(calibrated),
         Format::Heidenhain => heidenhain::write(calibrated, options),
         Format::Fanuc => vectors::fanuc(calibrated, options),
-    }
+    }?;
+    exported.say_in_file(format);
+    Ok(exported)
 }
 
 /// The machine is of a kind that the format does not hold.

@@ -10,8 +10,8 @@ use crate::import::Ends;
 use crate::units::{Quantity, amount};
 
 use super::Common;
-use super::files::Output;
-use super::output::{Outcome, length, open_machine, table, write_whole};
+use super::files::{Destination, Output};
+use super::output::{Outcome, length, open_machine, print, table, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -54,6 +54,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         options.base_file = Some(BaseFile::open(file, ends)?);
     }
     let exported = export(&calibrated, format, &options)?;
+    let on_output = matches!(args.common.json, Some(Destination::StandardOutput));
     match &args.output {
         Some(output) => {
             write_whole(output, |out| {
@@ -63,7 +64,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
             })?;
             args.common.say(&format!("{}written to {}\n", told(&exported), output.display()))?;
         }
-        None => args.common.say(&exported.text)?,
+        // Asked for, whatever else is not; JSON on standard output has it as a field.
+        None if !on_output => print(&exported.text)?,
+        None => {}
     }
     args.common.write_json(&json!({
         "machine": calibrated.machine().name(),
@@ -71,6 +74,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         "numbers": exported.numbers,
         "left_out": exported.left_out,
         "told": exported.told,
+        "text": args.output.is_none().then_some(&exported.text),
     }))
 }
 

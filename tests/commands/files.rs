@@ -22,7 +22,7 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 13] = [
+const TABLE: [Row; 14] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--json"]),
@@ -49,6 +49,7 @@ const TABLE: [Row; 13] = [
         &["--output", "--nc", "--truth", "--json"],
     ),
     row("import", &[], &["ROBOT.urdf"], &["--output", "--json"]),
+    row("export", &["--to", "urdf"], &["CALIBRATED.ron", "--base-file"], &["--output", "--json"]),
     row("machines", &[], &[], &["--json"]),
     row("demo", &[], &[], &["--report", "--json"]),
 ];
