@@ -7,8 +7,9 @@ use super::numbers::{exact, heading};
 use super::varying::varying;
 use super::{Exported, Number};
 use crate::calibration::CalibratedMachine;
+use crate::chain::Chain;
 use crate::error::Result;
-use crate::lie::{Pose, Vec3};
+use crate::lie::{Mat3, Pose, Vec3};
 use crate::machine::{JointKind, Machine};
 
 /// Sine of the angle between two axes below which they have no common normal that can be relied on.
@@ -66,9 +67,9 @@ fn commands(lines: &Lines) -> usize {
 }
 
 /// A rotation that takes z to this direction.
-fn turned_z(z: Vec3<f64>) -> crate::lie::Mat3<f64> {
+fn turned_z(z: Vec3<f64>) -> Mat3<f64> {
     let [x, _] = z.across();
-    crate::lie::Mat3([x.0, z.cross(x).0, z.0]).transpose()
+    Mat3([x.0, z.cross(x).0, z.0]).transpose()
 }
 
 /// From a frame whose z lies on one axis to one whose z lies on the next.
@@ -118,7 +119,7 @@ pub(super) fn write(calibrated: &CalibratedMachine, modified: bool) -> Result<Ex
     let machine = calibrated.machine();
     let lines = Lines::from_w(machine, &calibrated.chain());
     let table = Table::new(&lines);
-    let declared = Table::new(&Lines::from_w(machine, &crate::Chain::nominal(machine)));
+    let declared = Table::new(&Lines::from_w(machine, &Chain::nominal(machine)));
     let convention = if modified {
         "modified convention (Craig), from joint to joint: Tx(a) Rx(alpha) Ry(beta) Rz(theta) Tz(d)"
     } else {

@@ -13,7 +13,7 @@ use super::travel::poses;
 use super::{Exported, Number, Options, refused};
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
-use crate::lie::Vec3;
+use crate::lie::{Mat3, Vec3};
 use crate::machine::JointKind;
 
 /// A rotary axis of a module: its letter, and the sense in which the tool turns, as the part sees it, when the number grows.
@@ -179,7 +179,7 @@ impl<'a> Fitted<'a> {
             }
             let mut right = DVector::zeros(rows);
             for (k, (goal, p)) in goal.iter().zip(&here).enumerate() {
-                let hat = crate::lie::Mat3::hat(*p).0;
+                let hat = Mat3::hat(*p).0;
                 for x in 0..3 {
                     jacobian[(3 * k + x, free.len() + x)] = 1.0;
                     (0..3).for_each(|y| jacobian[(3 * k + x, free.len() + 3 + y)] = -hat[x][y]);

@@ -184,11 +184,7 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
         of.iter().fold(Vec3([0.0; 3]), |sum, (factor, n)| sum + place(lines, *n).times(*factor))
     };
     // Axis 1 is nearer to the base: of the part's axes the last, of the tool's the first.
-    let order: Vec<usize> = match (kind.part, kind.tool) {
-        (2, _) => vec![1, 0],
-        (1, _) => vec![1, 0],
-        _ => vec![0, 1],
-    };
+    let order = if kind.part > 0 { [1, 0] } else { [0, 1] };
     let direction = |lines: &Lines, n: usize| seen.direction(lines, axes[n].0, axes[n].1);
     let all = |lines: &Lines| -> Vec<f64> {
         let vectors = kind.vectors.iter().flat_map(|v| sum(lines, v.sum).times(MM.per_si).0);

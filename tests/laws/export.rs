@@ -250,9 +250,8 @@ fn what_cannot_be_exported_is_told_with_its_mend() {
     refuse(&arm, Format::Urdf, &based(text.replace("0.3 0 0.05", "0.3 0 0.06"), "finger"));
     refuse(&arm, Format::Urdf, &based(text.replace("1 -2 0.5", "1 -2 0.6"), "finger"));
     refuse(&arm, Format::Urdf, &based(text.replace("</robot>", ""), "finger"));
-    let entity = text
-        .replace("<robot", "<!DOCTYPE robot [<!ENTITY o \"0.3 0 0.05\">]>\n<robot")
-        .replace("\"0.3 0 0.05\"", "\"&o;\"");
+    let entity = text.replace("\"0.3 0 0.05\"", "\"&o;\"");
+    let entity = entity.replace("<robot", "<!DOCTYPE robot [<!ENTITY o \"0.3 0 0.05\">]>\n<robot");
     let mut moved = StdRng::seed_from_u64(1);
     let deviations = deviations(arm.machine().dyads().len(), &mut moved);
     let arm = arm.with_deviations(deviations);

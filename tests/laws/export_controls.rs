@@ -183,7 +183,7 @@ fn what_a_module_cannot_take_is_listed_with_its_size() {
     let machine = shipped("ac_table_tilting.ron");
     let mut dh = vec![Twist::zero(0.0); machine.dyads().len()];
     // 100 urad between Y and X: over half a travel of 450 mm some 20 um either way.
-    dh[machine.frame_index("y").expect("a frame")].w.0[2] = 1e-4;
+    dh[machine.frame_index("x").expect("a frame")].w.0[2] = 1e-4;
     let tilted = CalibratedMachine::nominal(machine).with_deviations(dh);
     let out = export(&tilted, Format::LinuxCnc, &options()).expect("a module");
     let left = out.left_out.first().expect("something is left");

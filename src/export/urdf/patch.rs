@@ -10,6 +10,7 @@ use crate::export::travel::poses;
 use crate::export::{Exported, Remainder};
 use crate::import::{Edit, Ends, Held, origins, read};
 use crate::lie::{Pose, Twist};
+use crate::machine::{Dyad, Machine};
 
 /// A base file is that of a machine if frames agree to this, m and rad: machine files may have been written with fewer digits.
 const SAME: f64 = 1e-6;
@@ -114,13 +115,13 @@ fn crossed(file: &Path) -> Error {
 }
 
 /// Whether the machine was imported from this file.
-fn is_same(calibrated: &CalibratedMachine, found: &crate::Machine, file: &Path, held: &[Held]) -> Result<()> {
+fn is_same(calibrated: &CalibratedMachine, found: &Machine, file: &Path, held: &[Held]) -> Result<()> {
     let machine = calibrated.machine();
     let fault = |line: usize, what: String| {
         let mend = "give the file that the machine was imported from, and the same --base and --tip";
         Err(Error::mistake(Place::at(file, line, 0), what, mend))
     };
-    let frames = |m: &crate::Machine| m.dyads().iter().map(|d| d.frame.clone()).collect::<Vec<_>>();
+    let frames = |m: &Machine| m.dyads().iter().map(|d| d.frame.clone()).collect::<Vec<_>>();
     let (own, other) = (frames(machine), frames(found));
     if own != other || machine.workpiece_count() != found.workpiece_count() {
         let what = format!(
@@ -142,7 +143,7 @@ fn is_same(calibrated: &CalibratedMachine, found: &crate::Machine, file: &Path, 
             );
             return fault(line, what);
         }
-        let moves = |d: &crate::machine::Dyad| d.joint.as_ref().map(|joint| (joint.kind, joint.axis));
+        let moves = |d: &Dyad| d.joint.as_ref().map(|joint| (joint.kind, joint.axis));
         let same = match (moves(a), moves(b)) {
             (Some((kind, axis)), Some((other, other_axis))) => {
                 kind == other && (axis - other_axis).norm() < SAME
