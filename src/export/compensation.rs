@@ -113,16 +113,25 @@ pub(super) fn enc_comp(calibrated: &CalibratedMachine) -> Result<Exported> {
                 own.unit
             ));
         }
+        let mean = |i: usize| 0.5 * (own.forward[i] + own.backward[i]);
+        if (0..own.positions.len()).all(|i| mean(i).abs() < 1e-9) {
+            continue;
+        }
         let (first, last) = (own.positions[0], own.positions[own.positions.len() - 1]);
         let step = (last - first) / (own.positions.len() - 1) as f64;
         for i in 0..own.positions.len() {
-            let mean = 0.5 * (own.forward[i] + own.backward[i]);
-            let _ = writeln!(body, "$AA_ENC_COMP[0,{i},{axis}]={}", fixed(mean));
+            let _ = writeln!(body, "$AA_ENC_COMP[0,{i},{axis}]={}", fixed(mean(i)));
         }
         let _ = writeln!(body, "$AA_ENC_COMP_STEP[0,{axis}]={}", fixed(step));
         let _ = writeln!(body, "$AA_ENC_COMP_MIN[0,{axis}]={}", fixed(first));
         let _ = writeln!(body, "$AA_ENC_COMP_MAX[0,{axis}]={}", fixed(last));
         let _ = writeln!(body, "$AA_ENC_COMP_IS_MODULO[0,{axis}]=0");
+    }
+    if body.is_empty() {
+        return Err(refused(
+            format!("the axes of machine \"{}\" have play alone, which ENC_COMP cannot hold", machine.name()),
+            "--to table shows it; a control takes play as backlash",
+        ));
     }
     told.iter().for_each(|line| text.push_str(&format!("; {line}\n")));
     text.push_str(&body);

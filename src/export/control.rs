@@ -131,6 +131,17 @@ impl<'a> Seen<'a> {
         found
     }
 
+    /// What entering the numbers is worth: `before` and `after` as the control moves the machine.
+    pub fn gain(&self, before: &Lines, after: &Lines) -> String {
+        let full = self.calibrated_lines();
+        let um = |lines: &Lines| format!("{:.1} um", 1e6 * self.apart(&full, lines).0);
+        format!(
+            "constant geometry at the tool tip, part set up anew: the declared numbers leave up to {}, these {}",
+            um(before),
+            um(after)
+        )
+    }
+
     /// How far the tips of two machines are apart over the travel once the part is set up anew.
     pub fn apart(&self, one: &Lines, other: &Lines) -> (f64, f64) {
         let poses = poses(self.calibrated, POSES);

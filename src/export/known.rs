@@ -111,7 +111,7 @@ pub(super) fn open_at_tool(calibrated: &CalibratedMachine) -> Option<String> {
     let patterns = calibrated.unseen().filter(|patterns| !patterns.is_empty())?;
     let machine = calibrated.machine();
     let chain = calibrated.chain();
-    let mut worst: f64 = 0.0;
+    let (mut worst, mut turned): (f64, f64) = (0.0, 0.0);
     let moved: Vec<Chain<f64>> = patterns
         .iter()
         .map(|pattern| {
@@ -120,17 +120,20 @@ pub(super) fn open_at_tool(calibrated: &CalibratedMachine) -> Option<String> {
         })
         .collect();
     for q in poses(calibrated, 50) {
-        let tip = chain.w_from_t(&q).translation;
-        let squares = moved.iter().map(|m| (m.w_from_t(&q).translation - tip).norm().powi(2));
-        worst = worst.max(squares.sum::<f64>().sqrt());
+        let t_from_w = chain.w_from_t(&q).inverse();
+        let gaps: Vec<Twist<f64>> = moved.iter().map(|m| (t_from_w * m.w_from_t(&q)).log()).collect();
+        let size = |of: fn(&Twist<f64>) -> f64| gaps.iter().map(|gap| of(gap).powi(2)).sum::<f64>().sqrt();
+        worst = worst.max(size(|gap| gap.v.norm()));
+        turned = turned.max(size(|gap| gap.w.norm()));
     }
     Some(format!(
-        "the recordings left {} of the deviations open, which stand at what the tolerances make likely: up to {} um at the tip over the travel (one standard deviation)",
+        "the recordings left {} of the deviations open, which stand at what the tolerances make likely: up to {:.1} um at the tip and {:.1} urad of the tool over the travel (one standard deviation)",
         if patterns.len() == 1 {
             "one combination".to_string()
         } else {
             format!("{} combinations", patterns.len())
         },
-        (worst * 1e7).round() / 10.0
+        worst * 1e6,
+        turned * 1e6
     ))
 }

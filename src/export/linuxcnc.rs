@@ -31,6 +31,8 @@ struct Pin {
     held: Option<(usize, usize)>,
     /// Whether the tool's length is part of it.
     with_tool: bool,
+    /// The module has no such pin: it takes this coordinate as 0, and the zero of the machine has to be moved there.
+    is_zero: bool,
 }
 
 /// A kinematics module. Axes of the part come first, from the part inwards; then those of the tool, outwards.
@@ -46,7 +48,11 @@ const fn axis(letter: char, sense: f64) -> Axis {
 }
 
 const fn pin(name: &'static str, moves: &'static [(usize, usize)]) -> Pin {
-    Pin { name, moves, held: None, with_tool: false }
+    Pin { name, moves, held: None, with_tool: false, is_zero: false }
+}
+
+const fn zero(name: &'static str, moves: &'static [(usize, usize)]) -> Pin {
+    Pin { name, moves, held: None, with_tool: false, is_zero: true }
 }
 
 const X: usize = 0;
@@ -65,7 +71,7 @@ const MODULES: [Module; 5] = [
             pin("y-rot-point", &[(0, Y), (1, Y)]),
             pin("z-rot-point", &[(1, Z)]),
             pin("y-offset", &[(1, Y)]),
-            Pin { name: "z-offset", moves: &[(1, Z)], held: Some((1, 0)), with_tool: false },
+            Pin { name: "z-offset", moves: &[(1, Z)], held: Some((1, 0)), with_tool: false, is_zero: false },
         ],
     },
     // W = P + Rz(-C) (o + Ry(-B) (J - P - o)), o = (x-offset, 0, z-offset)
@@ -78,7 +84,7 @@ const MODULES: [Module; 5] = [
             pin("y-rot-point", &[(0, Y)]),
             pin("z-rot-point", &[(1, Z)]),
             pin("x-offset", &[(1, X)]),
-            Pin { name: "z-offset", moves: &[(1, Z)], held: Some((1, 0)), with_tool: false },
+            Pin { name: "z-offset", moves: &[(1, Z)], held: Some((1, 0)), with_tool: false, is_zero: false },
         ],
     },
     // W = P + Rx(A) (Ry(B) (J - P) - z-offset ez) + z-offset ez
@@ -98,14 +104,18 @@ const MODULES: [Module; 5] = [
         name: "5axiskins",
         part: &[],
         tool: &[axis('C', 1.0), axis('B', -1.0)],
-        pins: &[Pin { name: "pivot-length", moves: &[(1, Z)], held: None, with_tool: true }],
+        pins: &[Pin { name: "pivot-length", moves: &[(1, Z)], held: None, with_tool: true, is_zero: false }],
     },
     // Wxy = Rz(C) (Jxy + (L sin B, 0)), Wz = Jz + L - L cos B
     Module {
         name: "maxkins",
         part: &[axis('C', 1.0)],
         tool: &[axis('B', -1.0)],
-        pins: &[Pin { name: "pivot-length", moves: &[(1, Z)], held: None, with_tool: true }],
+        pins: &[
+            zero("machine zero of X", &[(0, X)]),
+            zero("machine zero of Y", &[(0, Y)]),
+            Pin { name: "pivot-length", moves: &[(1, Z)], held: None, with_tool: true, is_zero: false },
+        ],
     },
 ];
 
@@ -242,12 +252,14 @@ pub(super) fn write(calibrated: &CalibratedMachine, options: &Options) -> Result
     let declared = fitted.fit(&seen.declared_lines());
     let verdicts = seen.judge(|lines| fitted.fit(lines));
     let held = fitted.lines(&pins, &full);
+    let before = fitted.lines(&declared, &full);
 
     let mut exported = common(&seen, "a kinematics module has no number for it; `compensate` takes it")?;
     exported
         .told
         .insert(0, format!("kinematics module {}; the part is set up anew after the change", module.name));
     exported.told.push("pins are found by least squares of the tool tip over the travel".into());
+    exported.told.push(seen.gain(&before, &held));
     senses(&seen, module, &fitted.axes, &full, &mut exported.told);
     for pin in module.pins.iter().filter(|pin| pin.held.is_some()) {
         exported.told.push(format!(
@@ -270,6 +282,13 @@ pub(super) fn write(calibrated: &CalibratedMachine, options: &Options) -> Result
         });
         let note = if pin.with_tool { ", the tool's length included" } else { "" };
         let _ = match &because {
+            None if pin.is_zero => writeln!(
+                text,
+                "# {} must lie at {} of today, where the module takes its first axis to be; declared {}",
+                pin.name,
+                fixed(value),
+                fixed(was)
+            ),
             None => writeln!(text, "setp {name} {} # declared {}{note}", fixed(value), fixed(was)),
             Some(because) => writeln!(text, "# {name} is not entered: {because}"),
         };

@@ -35,6 +35,7 @@ struct Kind {
 
 /// A control.
 struct Control {
+    name: &'static str,
     title: &'static str,
     comment: &'static str,
     kinds: &'static [Kind],
@@ -60,6 +61,7 @@ const TC: &str = "$TC_CARR";
 
 /// docs/export.md names the sources. Axis 1 is the one nearer to the base.
 const SIEMENS: Control = Control {
+    name: "SINUMERIK",
     title: "SINUMERIK tool carrier and five-axis transformation",
     comment: ";",
     kinds: &[
@@ -105,6 +107,7 @@ const SIEMENS: Control = Control {
 };
 
 const FANUC: Control = Control {
+    name: "FANUC",
     title: "FANUC tool centre point control",
     comment: "#",
     kinds: &[
@@ -162,18 +165,18 @@ pub(super) fn fanuc(calibrated: &CalibratedMachine, options: &Options) -> Result
 }
 
 fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
-    let seen = Seen::new(calibrated, options, control.title)?;
+    let seen = Seen::new(calibrated, options, control.name)?;
     let layout = &seen.layout;
     let Some(kind) =
         control.kinds.iter().find(|k| (k.part, k.tool) == (layout.part.len(), layout.tool.len()))
     else {
         return Err(refused(
             format!(
-                "machine \"{}\" has {} rotary axes in the table and {} in the head, and {} holds two in all",
+                "machine \"{}\" has rotary axes: {} in the table, {} in the head; {} holds two in all",
                 calibrated.machine().name(),
                 layout.part.len(),
                 layout.tool.len(),
-                control.title
+                control.name
             ),
             "export it by --to iso230, urdf, dh or mdh",
         ));
@@ -201,6 +204,9 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
     exported.told.extend(control.says.iter().map(|s| s.to_string()));
     let names: Vec<&str> = order.iter().map(|n| layout.names[axes[*n].0].as_str()).collect();
     exported.told.push(format!("axis 1 is {}, axis 2 is {}", names[0], names[1]));
+    let limits = if control.directions { square } else { upright };
+    let held = limits(layout, &full);
+    exported.told.push(seen.gain(&limits(layout, &declared), &held));
     let mut text = format!("{} {}\n", control.comment, heading(calibrated.machine().name(), control.title));
     exported.told.iter().for_each(|line| text.push_str(&format!("{} {line}\n", control.comment)));
     let mut i = 0;
@@ -225,13 +231,15 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
                 )
             });
             let axis = ["x", "y", "z"][k];
+            // Directions take what lengths of a metre show as nanometres.
+            let shown = |x: f64| if unit == "1" { format!("{x:.9}") } else { fixed(x) };
             let _ = match &because {
                 None => writeln!(
                     text,
                     "{place}={} {} {axis}, declared {}",
-                    fixed(value),
+                    shown(value),
                     control.comment,
-                    fixed(was)
+                    shown(was)
                 ),
                 Some(because) => {
                     writeln!(text, "{} {place} ({axis}) is not entered: {because}", control.comment)
@@ -253,7 +261,6 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
         rows("V1", TC, 7, "MD24570 AXIS1", "direction of axis 1", "1");
         rows("V2", TC, 10, "MD24572 AXIS2", "direction of axis 2", "1");
     }
-    let held = if control.directions { square(layout, &full) } else { upright(layout, &full) };
     let mut constant = seen.remainders(&held, "the control has no number for it; `compensate` takes it");
     if !control.rest.is_empty() && kind.part > 0 {
         let mut without = full.clone();

@@ -235,6 +235,11 @@ fn what_cannot_be_exported_is_told_with_its_mend() {
     let mut other = Options::default();
     other.axis = Some("w".into());
     refuse(&lift(), Format::LinuxCncComp, &other);
+    let play = "(effect: \"scale_error\"";
+    let text = std::fs::read_to_string(folder("tests/exports/lift.ron")).expect("a text");
+    let text: String =
+        text.lines().filter(|line| !line.contains(play)).flat_map(|line| [line, "\n"]).collect();
+    refuse(&CalibratedMachine::parse("lift.ron", &text).expect("sound"), Format::EncComp, &none);
     // Base files that are not the machine's.
     let ends = Ends { base: None, tip: Some("finger".into()) };
     let text = std::fs::read_to_string(folder("tests/urdf/arm.urdf")).expect("a text");

@@ -81,6 +81,12 @@ fn head(l: f64, j: [f64; 3], b: f64, c: f64) -> [f64; 3] {
     plus(plus(j, [0.0, 0.0, l]), turned(2, c, turned(1, -b, [0.0, 0.0, -l])))
 }
 
+/// Wxy = Rz(C) (Jxy + (L sin B, 0)), Wz = Jz + L - L cos B.
+fn bifurcated(l: f64, j: [f64; 3], b: f64, c: f64) -> [f64; 3] {
+    let (s, k) = b.to_radians().sin_cos();
+    turned(2, c, plus(j, [l * s, 0.0, l - l * k]))
+}
+
 /// Rows that LinuxCNC's own modules have computed (docs/export.md); they say that the formulas of this file are theirs.
 #[test]
 fn the_formulas_are_those_of_linuxcnc() {
@@ -99,6 +105,12 @@ fn the_formulas_are_those_of_linuxcnc() {
     // With W at 8.749275 the pivot is that much longer, and stands where it was.
     let w = head(187.3456 + 8.749275, [-13.209319, -275.501427, 77.615565], -33.186132, -177.442897);
     same(minus(w, [0.0, 0.0, 8.749275]), [94.01842601853178, -270.71268717111525, 100.849987226036]);
+    // The same with U and V, which move the head: U turns with B.
+    let (u, v, w, b) = (-12.883807, -16.763323, -23.229832, -4.071289_f64);
+    let head_moved = [u * b.to_radians().cos(), v, u * b.to_radians().sin()];
+    let j = minus([286.4829203319224, 67.46567622485475, 99.02009601255025], head_moved);
+    let tip = minus(bifurcated(187.3456 + w, j, b, 94.897253), [0.0, 0.0, w]);
+    same(tip, [-108.480714, 279.441612, 121.749357]);
 }
 
 /// A machine whose deviations are shifts only: those that a module can take, besides those that no module need take.
@@ -167,6 +179,14 @@ fn linuxcnc_with_our_numbers_has_the_tool_tip_of_the_model_where_it_can() {
     let p = ["x-rot-point", "y-rot-point", "z-rot-point"].map(|pin| value(&out, pin));
     let dz = value(&out, "z-offset");
     let gap = apart(&ba, [("a", 1.0), ("b", 1.0)], |j, [a, b]| tdr(p, dz, dt, j, a, b));
+    assert!(gap < SAME, "{gap:e}");
+
+    let shifts = [("b", [0.02, 0.01, 0.04]), ("t", [-0.02, 0.03, 0.01]), ("c", [0.03, -0.05, 0.02])];
+    let bc = shifted(shipped("bc_head_table.ron"), &shifts);
+    let out = export(&bc, Format::LinuxCnc, &options()).expect("a module");
+    let l = value(&out, "pivot-length");
+    let zero = [value(&out, "machine zero of X"), value(&out, "machine zero of Y"), 0.0];
+    let gap = apart(&bc, [("b", -1.0), ("c", 1.0)], |j, [b, c]| bifurcated(l, minus(j, zero), b, c));
     assert!(gap < SAME, "{gap:e}");
 
     // The head turns against the module, which is told.
