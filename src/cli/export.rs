@@ -46,13 +46,13 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Outcome {
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let format = Format::named(&args.to).unwrap_or(Format::Iso230);
-    let mut options = Options::default();
-    options.tool_length = args.tool_length;
-    options.axis.clone_from(&args.axis);
-    if let Some(file) = &args.base_file {
-        let ends = Ends { base: args.base.clone(), tip: args.tip.clone() };
-        options.base_file = Some(BaseFile::open(file, ends)?);
-    }
+    let based =
+        |file: &PathBuf| BaseFile::open(file, Ends { base: args.base.clone(), tip: args.tip.clone() });
+    let options = Options {
+        tool_length: args.tool_length,
+        axis: args.axis.clone(),
+        base_file: args.base_file.as_ref().map(based).transpose()?,
+    };
     let exported = export(&calibrated, format, &options)?;
     let on_output = matches!(args.common.json, Some(Destination::StandardOutput));
     match &args.output {

@@ -98,10 +98,10 @@ pub(super) fn aligned(goal: &[Vec3<f64>], points: &[Vec3<f64>]) -> (f64, f64) {
         for (goal, p) in goal.iter().zip(&moved) {
             let hat = Mat3::hat(*p - centre).0;
             let gap = *goal - *p;
-            for i in 0..3 {
+            for (i, hat) in hat.iter().enumerate() {
                 let row = nalgebra::RowVector6::from_fn(|_, k| match k {
                     0..3 => f64::from(u8::from(i == k)),
-                    _ => -hat[i][k - 3],
+                    _ => -hat[k - 3],
                 });
                 matrix += row.transpose() * row;
                 right += row.transpose() * gap.0[i];

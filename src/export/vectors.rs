@@ -195,7 +195,7 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -
         vectors.chain(directions).collect()
     };
     let (full, declared) = (seen.calibrated_lines(), seen.declared_lines());
-    let (values, before, verdicts) = (all(&full), all(&declared), seen.judge(&all));
+    let (values, before, verdicts) = (all(&full), all(&declared), seen.judge(all));
     let mut exported = common(
         &seen,
         "this file holds constant geometry; `compensate` takes it, and --to enc-comp a part of it",

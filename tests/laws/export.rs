@@ -58,7 +58,7 @@ fn a_urdf_file_read_back_is_the_same_machine() {
             continue;
         };
         let ends = Ends { base: Some("w".into()), tip: Some("t".into()) };
-        let back = read("back.urdf", &exported.text, &ends).expect(machine.name()).machine;
+        let back = read("back.urdf", &exported.text, &ends).expect("sound").machine;
         assert_eq!(back.commands(), machine.commands());
         for _ in 0..20 {
             let q = commands(machine, &mut rng);
@@ -134,7 +134,7 @@ fn a_chain_rebuilt_from_its_dh_table_is_the_same_machine() {
     for calibrated in machines() {
         let machine = calibrated.machine();
         for (format, modified) in [(Format::Dh, false), (Format::Mdh, true)] {
-            let text = export(&calibrated, format, &Options::default()).expect(machine.name()).text;
+            let text = export(&calibrated, format, &Options::default()).expect("a table").text;
             let rows: Vec<Vec<&str>> = (text.lines().filter(|line| !line.starts_with('#')).skip(1))
                 .map(|line| line.split(',').collect())
                 .collect();

@@ -193,7 +193,7 @@ fn stands_there(
     let goal = Chain::new(calibrated.machine(), kept);
     let off = poses(calibrated, 20).iter().any(|q| {
         let gap = (written.w_from_t(q).inverse() * goal.w_from_t(q)).log().to_array();
-        gap.iter().any(|x| !(x.abs() < ROUNDING + SAME))
+        gap.iter().any(|x| x.is_nan() || x.abs() > ROUNDING + SAME)
     });
     if off { Err(crossed(file)) } else { Ok(()) }
 }
