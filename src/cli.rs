@@ -8,6 +8,7 @@ mod convert;
 mod demo;
 mod describe;
 mod diagnose;
+mod export;
 mod failure;
 mod files;
 mod import;
@@ -64,6 +65,8 @@ enum Command {
     Import(import::Args),
     /// A recording from a table of another program: other names, units, separators, forms of rotations
     Convert(Box<convert::Args>),
+    /// A calibrated machine as ISO 230-1 table, URDF, DH table, parameters of a control or compensation table
+    Export(export::Args),
     /// The machines that come with the program, or the file of one of them
     Machines(machines::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
@@ -121,6 +124,7 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Simulate(args) => simulate::run(args, files),
         Command::Import(args) => import::run(args),
         Command::Convert(args) => convert::run(args, files),
+        Command::Export(args) => export::run(args),
         Command::Machines(args) => machines::run(args),
         Command::Demo(args) => demo::run(args),
     }

@@ -5,6 +5,7 @@
 
 mod chain;
 mod names;
+mod origins;
 mod step;
 mod urdf;
 mod write;
@@ -14,6 +15,8 @@ use std::path::Path;
 
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
+
+pub(crate) use origins::{Edit, Held, origins};
 
 /// Which part of a description becomes the machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -66,7 +69,11 @@ pub fn open(path: impl AsRef<Path>, ends: &Ends) -> Result<Imported> {
 pub fn read(file: impl AsRef<Path>, text: &str, ends: &Ends) -> Result<Imported> {
     let file = file.as_ref();
     let robot = urdf::read(file, text)?;
-    let chain = chain::cut(&robot, ends)?;
+    machine_of(file, chain::cut(&robot, ends)?)
+}
+
+/// The machine that a chain is.
+fn machine_of(file: &Path, chain: chain::Chain) -> Result<Imported> {
     let text = write::ron(file, &chain);
     // What a machine file cannot hold is told by the reader of machine files, of the place in the robot's file.
     let machine = Machine::parse(file, &text).map_err(|error| {

@@ -52,6 +52,7 @@
 //! | [`simulate`] | recordings of machines whose errors are known: faults, tests, instruments |
 //! | [`import`](mod@import) | machines from URDF (feature `import`) |
 //! | [`convert`](mod@convert) | recordings from foreign tables (feature `import`) |
+//! | [`export`](mod@export) | calibrated machines as URDF, DH tables, parameters of controls (feature `import`) |
 //! | `demo` | the reference machine, a simulated recording, and what a diagnosis says of it |
 //! | `cli` | the command line, a thin face over all of it (feature `cli`) |
 //!
@@ -131,6 +132,8 @@ mod error_motion;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod error_motion;
+#[cfg(feature = "import")]
+pub mod export;
 #[cfg(not(feature = "internals"))]
 mod feature;
 #[cfg(feature = "internals")]

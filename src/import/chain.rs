@@ -16,6 +16,8 @@ pub(super) struct Entry {
     pub offset: Option<Pose<f64>>,
     pub joint: Option<JointEntry>,
     pub mass: Option<Mass>,
+    /// The joints of the description, fixed ones included, whose origins are in it, by index.
+    pub steps: Vec<usize>,
     /// Where it comes from.
     pub note: String,
 }
@@ -213,9 +215,10 @@ struct Maker<'a> {
 impl Maker<'_> {
     fn entries(&mut self, steps: &[&Step], end: &str, end_link: usize) -> Result<Vec<Entry>> {
         let mut entries: Vec<Entry> = Vec::new();
-        let (mut moves, mut notes) = (Vec::new(), Vec::new());
+        let (mut moves, mut notes, mut passed) = (Vec::new(), Vec::new(), Vec::new());
         for step in steps {
             moves.extend(&step.moves);
+            passed.extend(self.robot.steps.iter().position(|own| std::ptr::eq(own, *step)));
             let (kind, axis, travel, mimic) = match &step.motion {
                 Motion::Refused { what, mend } => {
                     return Err(Error::mistake(self.robot.place(step.line), what, mend));
@@ -243,6 +246,7 @@ impl Maker<'_> {
                 offset: (offset != 0.0).then(|| Pose::exp(twist)),
                 joint: Some(JointEntry { kind, axis, travel, follows }),
                 mass: None,
+                steps: std::mem::take(&mut passed),
                 note: std::mem::take(&mut notes).join(", "),
             };
             self.weigh(&mut entry, step.child);
@@ -250,7 +254,15 @@ impl Maker<'_> {
         }
         notes.push(format!("link {}", one_line(&self.robot.links[end_link].name)));
         let note = notes.join(", ");
-        entries.push(Entry { frame: end.into(), moves, offset: None, joint: None, mass: None, note });
+        entries.push(Entry {
+            frame: end.into(),
+            moves,
+            offset: None,
+            joint: None,
+            mass: None,
+            steps: passed,
+            note,
+        });
         Ok(entries)
     }
 

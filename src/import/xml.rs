@@ -15,17 +15,24 @@ pub(super) struct Source<'a> {
     text: String,
     /// Lines that were left out at the beginning.
     before: usize,
+    /// Bytes that were left out there.
+    cut: usize,
+    /// Declarations that were put in: where, and how many bytes.
+    put_in: (usize, usize),
 }
 
 impl<'a> Source<'a> {
     pub fn new(file: &'a Path, text: &str) -> Result<Self> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let before = text[..text.len() - start.len()].matches('\n').count();
-        let mut source = Source { file, text: start.to_string(), before };
+        let mut source =
+            Source { file, text: start.to_string(), before, cut: text.len() - start.len(), put_in: (0, 0) };
         for _ in 0..MOST_PREFIXES {
             let Err(XmlError::UnknownNamespace(prefix, _)) = source.parse() else { break };
             let Some(at) = source.after_root_name() else { break };
-            source.text.insert_str(at, &format!(" xmlns:{prefix}=\"undeclared:{prefix}\""));
+            let declaration = format!(" xmlns:{prefix}=\"undeclared:{prefix}\"");
+            source.put_in = (at, source.put_in.1 + declaration.len());
+            source.text.insert_str(at, &declaration);
         }
         source.parse().map_err(|e| {
             let place = Place::at(file, e.pos().row as usize + before, e.pos().col as usize);
@@ -66,6 +73,12 @@ impl<'a> Source<'a> {
             };
             at += rest.find(end)? + end.len();
         }
+    }
+
+    /// A place in the parsed text as a place in the text that was given, both in bytes.
+    pub fn original(&self, at: usize) -> usize {
+        let (from, bytes) = self.put_in;
+        self.cut + if at > from { at.saturating_sub(bytes).max(from) } else { at }
     }
 
     pub fn line(&self, node: Node) -> usize {

@@ -22,7 +22,7 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 14] = [
+const TABLE: [Row; 15] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--json"]),
@@ -50,6 +50,7 @@ const TABLE: [Row; 14] = [
     ),
     row("import", &[], &["ROBOT.urdf"], &["--output", "--json"]),
     row("convert", &[], &["FILE", "--machine", "--map"], &["--write-map", "--output", "--json"]),
+    row("export", &["--to", "urdf"], &["CALIBRATED.ron", "--base-file"], &["--output", "--json"]),
     row("machines", &[], &[], &["--json"]),
     row("demo", &[], &[], &["--report", "--json"]),
 ];

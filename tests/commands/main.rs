@@ -12,6 +12,7 @@ mod docs_effects;
 mod docs_equations;
 mod docs_recordings;
 mod documents;
+mod export;
 mod files;
 mod interrupted;
 mod loads;

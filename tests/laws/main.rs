@@ -15,6 +15,8 @@ mod compensate;
 mod convert;
 mod effects;
 mod effects_in_files;
+mod export;
+mod export_controls;
 mod features;
 mod import;
 mod interface;

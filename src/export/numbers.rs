@@ -1,0 +1,49 @@
+//! Numbers as texts, in the units of those who read them.
+
+use crate::machine::JointKind;
+
+/// A unit of a foreign file and how many of it make 1 m or 1 rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct In {
+    pub symbol: &'static str,
+    pub per_si: f64,
+}
+
+pub(super) const UM: In = In { symbol: "um", per_si: 1e6 };
+pub(super) const URAD: In = In { symbol: "urad", per_si: 1e6 };
+pub(super) const MM: In = In { symbol: "mm", per_si: 1e3 };
+pub(super) const DEG: In = In { symbol: "deg", per_si: 180.0 / std::f64::consts::PI };
+
+impl In {
+    /// Of a joint's position.
+    pub fn position(kind: JointKind) -> In {
+        if kind == JointKind::Revolute { DEG } else { MM }
+    }
+
+    /// Of a joint's error.
+    pub fn error(kind: JointKind) -> In {
+        if kind == JointKind::Revolute { URAD } else { UM }
+    }
+}
+
+/// A number with six decimals; no minus before a zero.
+pub(super) fn fixed(value: f64) -> String {
+    let text = format!("{value:.6}");
+    if text.trim_start_matches(['-', '0', '.']).is_empty() { "0.000000".into() } else { text }
+}
+
+/// As short as it reads back.
+pub(super) fn exact(x: f64) -> String {
+    let text = format!("{:?}", if x == 0.0 { 0.0 } else { x });
+    text.strip_suffix(".0").map_or(text.clone(), str::to_string)
+}
+
+/// A text where a line must stay one.
+pub(super) fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// The name of a machine in a foreign file.
+pub(super) fn heading(machine: &str, form: &str) -> String {
+    format!("{form} of machine {}, written by kincal {}", one_line(machine), env!("CARGO_PKG_VERSION"))
+}
