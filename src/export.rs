@@ -220,6 +220,11 @@ impl Exported {
 /// # Errors
 /// [`Error::Undetermined`] where the machine holds nothing that the format could, or is of a kind that it does not know.
 pub fn export(calibrated: &CalibratedMachine, format: Format, options: &Options) -> Result<Exported> {
+    let machine = calibrated.machine();
+    if machine.commands().is_empty() {
+        let what = format!("nothing moves on machine \"{}\"", machine.name());
+        return Err(refused(what, "give the file of a machine with a joint"));
+    }
     let mut exported = match format {
         Format::Iso230 => iso230::write(calibrated),
         Format::Table => table::write(calibrated),

@@ -170,7 +170,7 @@ fn mimic(text: &mut String, machine: &Machine, j: usize, joint: &Joint) -> Resul
                 joint.name,
                 if machine.branch(j) == Branch::Tool { "tool" } else { "workpiece" }
             ),
-            "a mimic joint of URDF follows one other joint; export such a machine by --to iso230 or keep its RON file",
+            "a mimic joint of URDF follows one other joint; export such a machine by --to dh or mdh",
         )),
     }
 }
