@@ -213,7 +213,7 @@ impl Exported {
 ///     calibration: (deviations: [(frame: "y", v: (0, 0, 0), w: (0, 0, 0.01))], unseen: []),
 /// )"#)?;
 /// let file = export(&mill, Format::Iso230, &Options::default())?;
-/// assert!(file.text.contains("EC0Y,174.532925,urad"));
+/// assert!(file.text.contains("EC0Y,174.53292"));
 /// # Ok::<(), kincal::Error>(())
 /// ```
 ///
