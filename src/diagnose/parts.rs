@@ -76,11 +76,6 @@ impl Unnamed {
         Unnamed { library, candidates, first, coarse }
     }
 
-    /// The dyad of a term's place; `None` for the instrument.
-    pub fn place(&self, term: &ModelTerm) -> Option<usize> {
-        self.candidates[term.candidate].place.dyad()
-    }
-
     /// The rows of a search, for these candidates.
     pub fn rows<'a>(&'a self, search: &Search<'a>) -> Rows<'a> {
         Rows::new(search.rows.linear, &self.coarse, search.rows.whitener.clone())

@@ -1,5 +1,6 @@
 //! Numbers as text with a fixed count of digits: what `{:.12e}` writes, in a fraction of its time.
 
+use std::f64::consts::LOG10_2;
 use std::fmt::Write;
 
 /// Most digits behind the point.
@@ -57,8 +58,8 @@ fn rounded(value: f64, decimals: usize) -> Option<(u64, i32)> {
     // value = mantissa * 2^power
     let bits = value.to_bits();
     let (mantissa, power) = (bits & ((1 << 52) - 1) | 1 << 52, ((bits >> 52) & 0x7ff) as i32 - 1075);
-    // 0.30103 is a little more than the logarithm of 2: the exponent is this one or the one below.
-    let mut exponent = (f64::from(power + 53) * 0.301_03).floor() as i32;
+    // The value is below 2^(power + 53): the exponent is this one or the one below.
+    let mut exponent = (f64::from(power + 53) * LOG10_2).floor() as i32;
     loop {
         // digits = mantissa * 5^scale * 2^(scale + power)
         let scale = decimals as i32 - exponent;
