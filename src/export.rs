@@ -35,7 +35,7 @@ pub enum Format {
     Iso230,
     /// Position errors of every joint over its travel, both directions, a CSV table.
     Table,
-    /// A robot description, m and rad: a new one, or the origins of [`Options::base_file`].
+    /// A robot description, m and rad: a new one, or the origins of [`ExportOptions::base_file`].
     Urdf,
     /// Denavit-Hartenberg parameters, standard convention.
     Dh,
@@ -91,7 +91,7 @@ impl fmt::Display for Format {
 /// What an export needs besides the calibrated machine.
 #[non_exhaustive]
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct ExportOptions {
     /// Length of the tool that frame `t` is the tip of, from the gauge line of the spindle, m.
     pub tool_length: f64,
     /// The axis of [`Format::LinuxCncComp`]; the only one that has position errors where nothing is said.
@@ -205,21 +205,21 @@ impl Exported {
 ///
 /// ```
 /// use kincal::CalibratedMachine;
-/// use kincal::export::{Format, Options, export};
+/// use kincal::export::{Format, ExportOptions, export};
 ///
 /// let mill = CalibratedMachine::parse("mill.ron", r#"Machine(
 ///     name: "mill", units: (length: mm, angle: deg), workpiece: [(frame: "w")],
 ///     tool: [(frame: "x", joint: Prismatic(axis: "x", travel: (0, 500))), (frame: "y", joint: Prismatic(axis: "y", travel: (0, 300))), (frame: "t")],
 ///     calibration: (deviations: [(frame: "y", v: (0, 0, 0), w: (0, 0, 0.01))], unseen: []),
 /// )"#)?;
-/// let file = export(&mill, Format::Iso230, &Options::default())?;
+/// let file = export(&mill, Format::Iso230, &ExportOptions::default())?;
 /// assert!(file.text.contains("EC0Y,174.53292"));
 /// # Ok::<(), kincal::Error>(())
 /// ```
 ///
 /// # Errors
 /// [`Error::Undetermined`] where the machine holds nothing that the format could, or is of a kind that it does not know.
-pub fn export(calibrated: &CalibratedMachine, format: Format, options: &Options) -> Result<Exported> {
+pub fn export(calibrated: &CalibratedMachine, format: Format, options: &ExportOptions) -> Result<Exported> {
     let machine = calibrated.machine();
     if machine.commands().is_empty() {
         let what = format!("nothing moves on machine \"{}\"", machine.name());

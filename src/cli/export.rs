@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use crate::calibration::CalibratedMachine;
-use crate::export::{BaseFile, Exported, FORMATS, Format, Options, export};
+use crate::export::{BaseFile, ExportOptions, Exported, FORMATS, Format, export};
 use crate::import::Ends;
 use crate::units::{Quantity, amount};
 
@@ -48,7 +48,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let format = Format::named(&args.to).unwrap_or(Format::Iso230);
     let based =
         |file: &PathBuf| BaseFile::open(file, Ends { base: args.base.clone(), tip: args.tip.clone() });
-    let options = Options {
+    let options = ExportOptions {
         tool_length: args.tool_length,
         axis: args.axis.clone(),
         base_file: args.base_file.as_ref().map(based).transpose()?,

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::curve::Curve;
 use super::numbers::{DEG, MM, fixed, heading};
 use super::table::{POINTS, curves, left_out};
-use super::{Exported, Options, refused};
+use super::{ExportOptions, Exported, refused};
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
 use crate::machine::{JointKind, Machine};
@@ -44,7 +44,7 @@ fn programmed(machine: &Machine, curve: &Curve) -> Programmed {
 }
 
 /// One axis as LinuxCNC's `COMP_FILE` of type 0.
-pub(super) fn comp_file(calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
+pub(super) fn comp_file(calibrated: &CalibratedMachine, options: &ExportOptions) -> Result<Exported> {
     let machine = calibrated.machine();
     let curves = curves(calibrated, POINTS)?;
     let names: Vec<&str> = curves.iter().map(|c| machine.commands()[c.command].as_str()).collect();

@@ -3,7 +3,7 @@
 use super::known::{Known, Verdict};
 use super::lines::{Line, Lines, aligned};
 use super::travel::poses;
-use super::{Exported, Options, Remainder, refused};
+use super::{ExportOptions, Exported, Remainder, refused};
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
 use crate::error::Result;
@@ -40,7 +40,7 @@ pub(super) struct Seen<'a> {
 impl<'a> Seen<'a> {
     /// # Errors
     /// Where the machine is none with X, Y and Z between the rotary axes of the part and those of the tool.
-    pub fn new(calibrated: &'a CalibratedMachine, options: &Options, form: &str) -> Result<Self> {
+    pub fn new(calibrated: &'a CalibratedMachine, options: &ExportOptions, form: &str) -> Result<Self> {
         let machine = calibrated.machine();
         let layout = layout(machine).map_err(|why| {
             refused(

@@ -4,14 +4,14 @@ use std::fmt::Write;
 
 use super::control::{Seen, common, square, unit};
 use super::numbers::{MM, fixed, heading};
-use super::{Exported, Number, Options, iso230};
+use super::{ExportOptions, Exported, Number, iso230};
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
 
 /// The largest change of a kinematics description that cycle 451 takes by itself, MP6600 as delivered, m.
 const LARGEST_CHANGE: f64 = 5e-5;
 
-pub(super) fn write(calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
+pub(super) fn write(calibrated: &CalibratedMachine, options: &ExportOptions) -> Result<Exported> {
     let seen = Seen::new(calibrated, options, "HEIDENHAIN")?;
     let axes: Vec<(usize, usize)> = seen.layout.part.iter().chain(&seen.layout.tool).copied().collect();
     let places = |lines: &super::lines::Lines| -> Vec<f64> {

@@ -10,7 +10,7 @@ use super::lines::Lines;
 use super::numbers::{DEG, MM, fixed, heading};
 use super::table::POINTS;
 use super::travel::poses;
-use super::{Exported, Number, Options, refused};
+use super::{ExportOptions, Exported, Number, refused};
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
 use crate::lie::{Mat3, Vec3};
@@ -230,7 +230,7 @@ impl<'a> Fitted<'a> {
     }
 }
 
-pub(super) fn write(calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
+pub(super) fn write(calibrated: &CalibratedMachine, options: &ExportOptions) -> Result<Exported> {
     let seen = Seen::new(calibrated, options, "LinuxCNC")?;
     let (part, tool) = seen.layout.pattern();
     let letters = |axes: &[Axis]| axes.iter().map(|axis| axis.letter).collect::<Vec<_>>();

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::control::{Seen, common, square, upright};
 use super::lines::Lines;
 use super::numbers::{MM, fixed, heading};
-use super::{Exported, Number, Options, Remainder, refused};
+use super::{ExportOptions, Exported, Number, Remainder, refused};
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
 use crate::lie::Vec3;
@@ -156,15 +156,15 @@ const FANUC: Control = Control {
     rest: "the parameters for the place of the table are not confirmed, and not written; --to iso230 has its offsets",
 };
 
-pub(super) fn siemens(calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
+pub(super) fn siemens(calibrated: &CalibratedMachine, options: &ExportOptions) -> Result<Exported> {
     write(&SIEMENS, calibrated, options)
 }
 
-pub(super) fn fanuc(calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
+pub(super) fn fanuc(calibrated: &CalibratedMachine, options: &ExportOptions) -> Result<Exported> {
     write(&FANUC, calibrated, options)
 }
 
-fn write(control: &Control, calibrated: &CalibratedMachine, options: &Options) -> Result<Exported> {
+fn write(control: &Control, calibrated: &CalibratedMachine, options: &ExportOptions) -> Result<Exported> {
     let seen = Seen::new(calibrated, options, control.name)?;
     let layout = &seen.layout;
     let Some(kind) =

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use kincal::export::{BaseFile, Format, Options, export};
+use kincal::export::{BaseFile, ExportOptions, Format, export};
 use kincal::import::{Ends, read};
 use kincal::lie::{Pose, Twist};
 use kincal::{CalibratedMachine, Chain, Machine};
@@ -49,7 +49,7 @@ fn a_urdf_file_read_back_is_the_same_machine() {
     let mut compared = 0;
     for calibrated in machines() {
         let machine = calibrated.machine();
-        let Ok(exported) = export(&calibrated, Format::Urdf, &Options::default()) else {
+        let Ok(exported) = export(&calibrated, Format::Urdf, &ExportOptions::default()) else {
             assert!(
                 machine.name().contains("justin") || machine.name().contains("jaibot"),
                 "{}",
@@ -92,7 +92,7 @@ fn a_base_file_keeps_every_byte_but_its_origins() {
         let machine = read(&path, &text, &ends).expect("sound").machine;
         let deviations = deviations(machine.dyads().len(), &mut rng);
         let calibrated = CalibratedMachine::nominal(machine.clone()).with_deviations(deviations);
-        let mut options = Options::default();
+        let mut options = ExportOptions::default();
         options.base_file = Some(BaseFile { file: path.clone(), text: text.clone(), ends: ends.clone() });
         let exported = export(&calibrated, Format::Urdf, &options).expect("sound");
         let back = read(&path, &exported.text, &ends).expect("sound").machine;
@@ -134,7 +134,7 @@ fn a_chain_rebuilt_from_its_dh_table_is_the_same_machine() {
     for calibrated in machines() {
         let machine = calibrated.machine();
         for (format, modified) in [(Format::Dh, false), (Format::Mdh, true)] {
-            let text = export(&calibrated, format, &Options::default()).expect("a table").text;
+            let text = export(&calibrated, format, &ExportOptions::default()).expect("a table").text;
             let rows: Vec<Vec<&str>> = (text.lines().filter(|line| !line.starts_with('#')).skip(1))
                 .map(|line| line.split(',').collect())
                 .collect();
@@ -170,7 +170,7 @@ fn lift() -> CalibratedMachine {
 
 #[test]
 fn a_table_holds_the_position_error_of_either_direction() {
-    let text = export(&lift(), Format::Table, &Options::default()).expect("curves").text;
+    let text = export(&lift(), Format::Table, &ExportOptions::default()).expect("curves").text;
     let mut rows = 0;
     for line in text.lines().filter(|line| line.starts_with("z,")) {
         let cell: Vec<&str> = line.split(',').collect();
@@ -187,7 +187,7 @@ fn a_table_holds_the_position_error_of_either_direction() {
 #[test]
 fn compensation_files_have_the_signs_of_their_controls() {
     // Commanded position, then where the axis is.
-    let comp = export(&lift(), Format::LinuxCncComp, &Options::default()).expect("one axis").text;
+    let comp = export(&lift(), Format::LinuxCncComp, &ExportOptions::default()).expect("one axis").text;
     let rows: Vec<Vec<f64>> =
         comp.lines().map(|l| l.split(' ').map(|c| c.parse().expect("a number")).collect()).collect();
     assert_eq!(rows.len(), 21);
@@ -200,7 +200,7 @@ fn compensation_files_have_the_signs_of_their_controls() {
     }
     assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
     // A positive value moves the axis in the negative direction: where the axis is too far, the value is positive.
-    let siemens = export(&lift(), Format::EncComp, &Options::default()).expect("one axis").text;
+    let siemens = export(&lift(), Format::EncComp, &ExportOptions::default()).expect("one axis").text;
     let value = |name: &str| -> f64 {
         let line = siemens.lines().find_map(|line| line.strip_prefix(name)).expect(name);
         line.trim_start_matches('=').parse().expect("a number")
@@ -217,12 +217,12 @@ fn compensation_files_have_the_signs_of_their_controls() {
 #[test]
 fn what_cannot_be_exported_is_told_with_its_mend() {
     let mut said = String::new();
-    let mut refuse = |calibrated: &CalibratedMachine, format: Format, options: &Options| {
+    let mut refuse = |calibrated: &CalibratedMachine, format: Format, options: &ExportOptions| {
         let error = export(calibrated, format, options).expect_err(calibrated.machine().name());
         assert!(!error.mend().is_empty());
         said.push_str(&format!("--to {format}: {error}\n  = {}\n", error.mend()));
     };
-    let none = Options::default();
+    let none = ExportOptions::default();
     let shipped = |name: &str| CalibratedMachine::open(folder("machines").join(name)).expect("a machine");
     refuse(&shipped("six_r_arm.ron"), Format::Iso230, &none);
     refuse(&shipped("six_r_arm.ron"), Format::Siemens, &none);
@@ -232,7 +232,7 @@ fn what_cannot_be_exported_is_told_with_its_mend() {
     refuse(&shipped("xyz_mill.ron"), Format::Fanuc, &none);
     refuse(&shipped("four_axis_horizontal.ron"), Format::LinuxCnc, &none);
     refuse(&shipped("dlr_justin_left.ron"), Format::Urdf, &none);
-    let mut other = Options::default();
+    let mut other = ExportOptions::default();
     other.axis = Some("w".into());
     refuse(&lift(), Format::LinuxCncComp, &other);
     let play = "(effect: \"scale_error\"";
@@ -246,7 +246,7 @@ fn what_cannot_be_exported_is_told_with_its_mend() {
     let machine = read("arm.urdf", &text, &ends).expect("sound").machine;
     let arm = CalibratedMachine::nominal(machine);
     let based = |text: String, tip: &str| {
-        let mut options = Options::default();
+        let mut options = ExportOptions::default();
         let ends = Ends { base: None, tip: Some(tip.into()) };
         options.base_file = Some(BaseFile { file: "robot.urdf".into(), text, ends });
         options

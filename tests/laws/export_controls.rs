@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use kincal::export::{Exported, Format, Options, export};
+use kincal::export::{ExportOptions, Exported, Format, export};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::{CalibratedMachine, Machine};
 use rand::rngs::StdRng;
@@ -36,8 +36,8 @@ fn table_b_a() -> Machine {
     .expect("a machine")
 }
 
-fn options() -> Options {
-    let mut options = Options::default();
+fn options() -> ExportOptions {
+    let mut options = ExportOptions::default();
     options.tool_length = TOOL;
     options
 }
