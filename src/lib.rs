@@ -21,7 +21,7 @@
 //!
 //! | room | noun |
 //! | --- | --- |
-//! | `wording` | how messages word what they count |
+//! | `wording` | how messages word what they count and quote |
 //! | `scalar` | [`Scalar`]: what kinematics is generic over, `f64` and dual numbers |
 //! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians |
 //! | [`units`] | units at the borders, and what lengths and angles have one of each |

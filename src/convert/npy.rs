@@ -6,8 +6,8 @@
 use std::path::Path;
 
 use super::table::{Table, Told};
-use super::text::shown;
 use crate::error::{Error, Place, Result};
+use crate::wording::shown;
 
 /// How such a file begins.
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";

@@ -6,11 +6,11 @@ use super::map::{Known, Part};
 use super::rotation::{CONVENTIONS, Euler};
 use super::table::{Found, Table};
 use super::target::{Target, quantity};
-use super::text::shown;
 use super::unit::{PURE, SECONDS, Spelled, spelled};
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::units::{Quantity, Unit};
+use crate::wording::shown;
 
 /// One field of every row, and what becomes of its number.
 #[derive(Clone, Debug)]

@@ -9,9 +9,10 @@ use super::Request;
 use super::heading::Heading;
 use super::map::{Map, Part};
 use super::table::{Row, Table};
-use super::text::{decoded, shown};
+use super::text::decoded;
 use crate::error::{Error, Place, Result};
 use crate::machine::{JointKind, Machine};
+use crate::wording::shown;
 
 /// Whether a file is one of these.
 pub(super) fn is_one(file: &Path, bytes: &[u8]) -> bool {

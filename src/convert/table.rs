@@ -7,8 +7,9 @@ use csv::StringRecord;
 use super::cell;
 use super::form::{self, Form, Separator, is_comment};
 use super::heading::Heading;
-use super::text::{decoded, shown};
+use super::text::decoded;
 use crate::error::{Error, Place, Result};
+use crate::wording::shown;
 
 /// A row with the number of its line.
 #[derive(Clone, Debug)]

@@ -22,19 +22,6 @@ fn narrow(bytes: &[u8]) -> String {
     }
 }
 
-/// Text of a file for a message: no longer than 40 characters, control characters escaped.
-pub(super) fn shown(text: &str) -> String {
-    let mut out = String::new();
-    for (n, c) in text.trim().chars().enumerate() {
-        if n == 40 {
-            out.push_str("...");
-            break;
-        }
-        if c.is_control() { out.extend(c.escape_default()) } else { out.push(c) }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,10 +8,10 @@ use super::moment::{self, Moment};
 use super::plan::{Column, Kind, Plan, Rotation, Source};
 use super::rotation;
 use super::table::{Row, Table};
-use super::text::shown;
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
 use crate::recording::Recording;
+use crate::wording::shown;
 
 /// One recording of a table.
 #[non_exhaustive]

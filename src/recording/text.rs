@@ -1,6 +1,7 @@
 //! Small tools for text that a user wrote: fields, numbers, names that are nearly right.
 
 use super::RecordingFault;
+use crate::wording;
 
 /// A fault with its line and column, both from 1; 0 where the whole file or line is meant.
 #[derive(Debug)]
@@ -95,18 +96,9 @@ pub(super) fn split<'a>(line: &'a [u8], mut each: impl FnMut(&'a [u8])) {
     each(&line[from..]);
 }
 
-/// Text for a message: no longer than 40 characters, control characters escaped.
+/// Text for a message.
 pub(super) fn shown(text: &[u8]) -> String {
-    let text = String::from_utf8_lossy(text);
-    let mut out = String::new();
-    for (n, c) in text.trim().chars().enumerate() {
-        if n == 40 {
-            out.push_str("...");
-            break;
-        }
-        if c.is_control() { out.extend(c.escape_default()) } else { out.push(c) }
-    }
-    out
+    wording::shown(&String::from_utf8_lossy(text))
 }
 
 /// Whether two words differ by at most two letters (one, where the right word is short), or only in case.
