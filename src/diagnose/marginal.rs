@@ -79,6 +79,15 @@ impl Marginal {
             - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
     }
 
+    /// What of columns is across to these others: `C - D (DᵀM D)⁻¹ DᵀM C`.
+    pub fn across(&self, columns: &DMatrix<f64>, others: &DMatrix<f64>) -> DMatrix<f64> {
+        let beside = self.beside(others);
+        match gram(others, &beside).pseudo_inverse(UNTOLD) {
+            Ok(inverse) => columns - others * (inverse * gram(&beside, columns)),
+            Err(_) => columns.clone(),
+        }
+    }
+
     /// How many columns `W` has, those included that are zero.
     pub fn width(&self) -> usize {
         self.panels.len() * WIDTH
@@ -146,5 +155,17 @@ mod tests {
         let exact = full.lu().solve(&x).expect("regular");
         assert!((&at_once - &exact).amax() < 1e-9, "{}", (&at_once - &exact).amax());
         assert!((&in_turn - &exact).amax() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_across_shares_nothing_beside_the_marginal() {
+        let column = |seed: f64| DVector::from_fn(50, |i, _| (seed * (i as f64 + 1.0)).sin());
+        let marginal = Marginal::new(DMatrix::from_columns(&[column(0.3) * 3.0]));
+        // One of the others says nothing, and one of the columns is a sum of theirs.
+        let others = DMatrix::from_columns(&[column(0.7), column(1.1), column(0.5) * 0.0]);
+        let columns = DMatrix::from_columns(&[column(0.7) - column(1.1) * 2.0, column(0.2)]);
+        let across = marginal.across(&columns, &others);
+        assert!(gram(&others, &marginal.beside(&across)).amax() < 1e-9);
+        assert!(across.column(0).amax() < 1e-9 && across.column(1).amax() > 0.5);
     }
 }

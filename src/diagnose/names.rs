@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::enter::solved;
-use super::evidence::log_sum_exp;
+use super::evidence::{evidence, log_mean_exp, log_sum_exp};
 use super::marginal::Marginal;
 use super::odds::LISTED;
 use super::parts::{Unnamed, is_foretold};
@@ -193,8 +193,9 @@ impl Unnamed {
         let search = &Search { overdispersion, ..self.search(search, search.rows) };
         let ground = Arc::new(search.beside_names(others));
         let left = ground.apply(&search.rows.residual);
-        let (departure, energy, alone) = self.departure(search, own, &free, &ground)?;
-        let evidence = |columns: &DMatrix<f64>| ground.worth(columns, &left, overdispersion);
+        let Departure { columns: departure, energy, nameless } =
+            self.departure(search, own, &free, &ground)?;
+        let worth = |columns: &DMatrix<f64>| ground.worth(columns, &left, overdispersion);
         let often = |c: usize| search.priors[c].exp();
         let of_all: f64 = families.iter().map(|c| often(*c)).sum();
         let each = (1.0 - NAMELESS) / of_all / DEPARTURES.len() as f64;
@@ -203,19 +204,21 @@ impl Unnamed {
             let c = plain.candidate;
             // It departs by a part of its own size: what does next to nothing explains nothing by departing from it.
             let size = (2.0 * plain.score.gain.max(0.0) / energy).sqrt().min(1.0);
+            let Some(term) = search.enter_bare(plain, &ground) else { continue };
+            // What the family does itself is no departure from it.
+            let departure = ground.across(&departure, &term.columns);
             for part in DEPARTURES {
                 let columns = &departure * (part * size);
                 let beside = Arc::new(ground.with(&(&columns / overdispersion.sqrt())));
                 for hypothesis in search.compare(beside, Some(&[c])) {
                     let prior = (each * often(c)).ln() - search.priors[c];
-                    let weight = evidence(&columns) + hypothesis.weight + prior;
+                    let weight = worth(&columns) + hypothesis.weight + prior;
                     let of_name = weighed.entry(self.candidates[c].told_as.as_str()).or_default();
                     of_name.push(Hypothesis { weight, ..hypothesis });
                 }
             }
         }
-        // Without a name, everything is departure, or one free function of the size that suits it.
-        let nothing = evidence(&departure).max(alone) + NAMELESS.ln();
+        let nothing = nameless + NAMELESS.ln();
         let of_name = |hypotheses: &Vec<Hypothesis>| {
             log_sum_exp(&hypotheses.iter().map(|h| h.weight).collect::<Vec<f64>>())
         };
@@ -233,26 +236,43 @@ impl Unnamed {
         Some(Names { all, best: ModelTerm { state, near: families, ..best } })
     }
 
-    /// Whitened columns of a free function of the group that is, with standard normal coefficients, as large as what is there, the energy
-    /// of that, and the logarithm of the evidence of the best such function alone.
+    /// What the free functions of the group say beside the `ground`; `None` where that is nothing.
     fn departure(
         &self,
         search: &Search,
         own: &[ModelTerm],
         free: &[usize],
         ground: &Arc<Marginal>,
-    ) -> Option<(DMatrix<f64>, f64, f64)> {
-        let best = search.compare(ground.clone(), Some(free)).into_iter().next()?;
-        let alone = best.weight - search.priors[best.candidate];
-        let best = search.enter_bare(&best, ground)?;
+    ) -> Option<Departure> {
+        let compared = search.compare(ground.clone(), Some(free));
+        let each = compared.iter().map(|h| h.weight - search.priors[h.candidate]);
+        let best = search.enter_bare(compared.first()?, ground)?;
         let is_free = |term: &&ModelTerm| term.candidate >= self.first && term.candidate != best.candidate;
         let functions: Vec<&ModelTerm> = own.iter().filter(is_free).chain([&best]).collect();
-        let parts: Vec<&DMatrix<f64>> = functions.iter().map(|term| &term.columns).collect();
-        let columns = side_by_side(&parts, search.rows.residual.len());
+        // As large as is usual: how much larger they are is integrated over, as it is for a name.
+        let parts: Vec<DMatrix<f64>> = functions.iter().map(|term| &term.columns / term.score.room).collect();
+        let columns = side_by_side(&parts.iter().collect::<Vec<_>>(), search.rows.residual.len());
         let (gram, toward) = search.normal(&columns, ground);
+        let together = evidence(&gram, &toward, columns.ncols(), search.overdispersion, 0).evidence;
+        // One of the free functions, or a set of several: nobody knows beforehand which.
+        let one = log_mean_exp(&each.collect::<Vec<f64>>());
+        let several = |k: usize| ((compared.len() - k) as f64 / (k + 1) as f64).ln();
+        let sets: f64 = (0..functions.len()).map(several).sum();
+        let nameless = if functions.len() > 1 { log_mean_exp(&[one, together - sets]) } else { one };
         let spread = gram.trace();
         let solution = solved(gram.clone(), &toward)?;
         let energy = solution.dot(&(gram * &solution));
-        (spread > 0.0 && energy > 0.0).then(|| (columns * (energy / spread).sqrt(), energy, alone))
+        let columns = columns * (energy / spread).sqrt();
+        (spread > 0.0 && energy > 0.0).then_some(Departure { columns, energy, nameless })
     }
+}
+
+/// What the free functions of a group say.
+struct Departure {
+    /// Whitened columns of those that are there; with standard normal coefficients as large as what is there.
+    columns: DMatrix<f64>,
+    /// The energy of that.
+    energy: f64,
+    /// Logarithm of the evidence that it is a free function, or a set of them, and no family.
+    nameless: f64,
 }
