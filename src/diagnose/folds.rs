@@ -152,12 +152,6 @@ pub(super) fn foretell_better(search: &Search, these: &[ModelTerm], others: &[Mo
     foretold(these).zip(foretold(others)).is_some_and(|(these, others)| these > others)
 }
 
-/// By how much better they are foretold by geometry alone, as a logarithm.
-fn foretold_without_all(search: &Search, in_model: &[ModelTerm]) -> Option<f64> {
-    let normal = Normal::new(search, in_model)?;
-    Some(normal.foretold(&|_| false)? - normal.foretold(&|_| true)?)
-}
-
 /// Whitened normal equations of each fold, with everything that an effect brings along: states and shape.
 struct Normal {
     folds: Vec<(DMatrix<f64>, DVector<f64>)>,
@@ -247,23 +241,25 @@ fn grams(
     (0..=owner.iter().copied().max().unwrap_or(0)).map(one).collect()
 }
 
-/// What predicts stretches that were left out no worse: effects without which their mean square would fall by more than this factor
-/// go, the worst first; and all of them, where together they do no better than geometry alone. In motion, where noise is known,
-/// effects stay of which the other stretches foretell how little they know of them in the one that was left out.
-pub(super) fn useful(search: &Search, in_model: &[ModelTerm], factor: f64) -> Vec<ModelTerm> {
+/// What foretells stretches that were left out: effects without which these are foretold better go, the worst first, and all of them where
+/// together they do worse than geometry alone. Settled positions are few, and where none is repeated nothing tells their noise: there every
+/// effect has to prove itself. In motion that has to be so by more than a standard error; what is
+/// undecided stays.
+pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> {
     let mut kept = in_model.to_vec();
-    let are_harm = |kept: &[ModelTerm]| {
-        !search.in_motion || foretold_without_all(search, kept).is_none_or(|without| without > 0.0)
-    };
+    let is_harm = |(gain, error): &(f64, f64)| if search.in_motion { *gain < -error } else { *gain < 0.0 };
     while let Some(folds) = Folds::new(search, &kept) {
-        let foretold = search.in_motion.then(|| foretold_without(search, &kept)).flatten();
-        let is_harm = |i: usize| foretold.as_ref().is_none_or(|without| without[i] > 0.0);
-        let each = folds.without_each(search, &kept).into_iter().enumerate();
-        let better = each.filter(|(i, b)| *b > factor && is_harm(*i));
-        match better.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        let each = (0..kept.len()).map(|i| (i, folds.gain(search, i)));
+        let worse = each.filter(|(_, gain)| is_harm(gain));
+        match worse.min_by(|(_, (a, _)), (_, (b, _))| a.total_cmp(b)) {
             Some((worst, _)) => drop(kept.remove(worst)),
-            None if folds.without_all(search) > factor && are_harm(&kept) => kept.clear(),
-            None => break,
+            None => {
+                let (alone, all) = (folds.left_out(search, &|_| false), folds.left_out(search, &|_| true));
+                if is_harm(&folds.fall(search, &alone, &all)) {
+                    kept.clear();
+                }
+                break;
+            }
         }
     }
     kept
@@ -362,12 +358,6 @@ impl Folds {
         let (count, sum) = (cells.len() as f64, cells.values().sum::<f64>());
         let spread = cells.values().map(|x| (x - sum / count).powi(2)).sum::<f64>() / (count - 1.0);
         (sum, (count * spread).sqrt())
-    }
-
-    /// By which factor the mean square of what is left out grows with each effect beside all others.
-    fn without_each(&self, search: &Search, in_model: &[ModelTerm]) -> Vec<f64> {
-        let all = self.energy(search, &|_| true);
-        (0..in_model.len()).map(|i| all / self.energy(search, &|effect| effect != i)).collect()
     }
 
     /// By which factor it grows with all effects beside geometry.

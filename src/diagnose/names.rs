@@ -20,7 +20,7 @@ use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
 use crate::feature::Dependence;
 
 /// Parts of its size by which the shape of what happens may depart from its family's; each is as likely beforehand.
-const DEPARTURES: [f64; 4] = [0.05, 0.1, 0.2, 0.4];
+const DEPARTURES: [f64; 3] = [0.05, 0.1, 0.2];
 
 /// How often what is found has no name.
 const NAMELESS: f64 = 0.2;
@@ -249,11 +249,17 @@ impl Unnamed {
         let best = search.enter_bare(compared.first()?, ground)?;
         let is_free = |term: &&ModelTerm| term.candidate >= self.first && term.candidate != best.candidate;
         let functions: Vec<&ModelTerm> = own.iter().filter(is_free).chain([&best]).collect();
-        // As large as is usual: how much larger they are is integrated over, as it is for a name.
-        let parts: Vec<DMatrix<f64>> = functions.iter().map(|term| &term.columns / term.score.room).collect();
-        let columns = side_by_side(&parts.iter().collect::<Vec<_>>(), search.rows.residual.len());
+        let side_by_side = |of: &dyn Fn(&ModelTerm) -> DMatrix<f64>| {
+            let parts: Vec<DMatrix<f64>> = functions.iter().map(|term| of(term)).collect();
+            side_by_side(&parts.iter().collect::<Vec<_>>(), search.rows.residual.len())
+        };
+        let columns = side_by_side(&|term| term.columns.clone());
         let (gram, toward) = search.normal(&columns, ground);
-        let together = evidence(&gram, &toward, columns.ncols(), search.overdispersion, 0).evidence;
+        // As large as is usual: how much larger they are is integrated over, as it is for a name.
+        let usual = side_by_side(&|term| &term.columns / term.score.room);
+        let (usual_gram, usual_toward) = search.normal(&usual, ground);
+        let overdispersion = search.overdispersion;
+        let together = evidence(&usual_gram, &usual_toward, usual.ncols(), overdispersion, 0).evidence;
         // One of the free functions, or a set of several: nobody knows beforehand which.
         let one = log_mean_exp(&each.collect::<Vec<f64>>());
         let several = |k: usize| ((compared.len() - k) as f64 / (k + 1) as f64).ln();

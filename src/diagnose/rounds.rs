@@ -29,8 +29,6 @@ const MOVES: usize = 3;
 const HOT: f64 = 3.0;
 /// What is left counts as more than noise beyond this many standard deviations of chance.
 const BEYOND_NOISE: f64 = 5.0;
-/// An effect without which the mean square of stretches left out falls by this factor runs wild there, whatever else speaks for it.
-const WILD: f64 = 2.0;
 
 /// What is diagnosed.
 pub(super) struct Case<'a> {
@@ -70,8 +68,6 @@ impl Case<'_> {
         let total: f64 = candidates.iter().map(|c| c.often).sum();
         let priors: Vec<f64> = candidates.iter().map(|c| (c.often / total).ln()).collect();
         let commonness = commonness(&candidates);
-        // Settled positions are few, and where none is repeated nothing tells their noise: every effect has to prove itself.
-        let most_wild = if facts_are_smooth(facts) { WILD } else { 1.0 };
         // What is left is noise, once everything else is modelled: the noise is judged anew from it.
         let mut noise = noise_of(&linear, &linear.residual, &runs, &out, facts);
         let mut in_model: Vec<ModelTerm> = Vec::new();
@@ -140,9 +136,9 @@ impl Case<'_> {
             if round == NOISE_ROUNDS || is_settled(&judged) {
                 let overdispersion = search.leftover(&search.beside(&in_model, None)).overdispersion;
                 if overdispersion < HOT {
-                    let found = search.unfolded(search.or_without_the_first(in_model), most_wild);
+                    let found = search.unfolded(search.or_without_the_first(in_model));
                     let found = search.moved_together(less_rare(&search, found));
-                    let in_model = search.polished(&folds::useful(&search, &found, most_wild));
+                    let in_model = search.polished(&folds::useful(&search, &found));
                     return Ok(report(&search, &in_model));
                 }
                 // Much is left, as it always is on real machines: the simplest names that stand out from it count.
@@ -152,9 +148,9 @@ impl Case<'_> {
                     grounds: RefCell::default(),
                     ..search
                 };
-                let found = less_rare(&search, search.unfolded(search.run(&in_model, |_| true), most_wild));
+                let found = less_rare(&search, search.unfolded(search.run(&in_model, |_| true)));
                 let found = search.moved_together(found);
-                in_model = search.polished(&folds::useful(&search, &found, most_wild));
+                in_model = search.polished(&folds::useful(&search, &found));
                 if moves < MOVES
                     && let Some(late) = late(&search, &in_model, plain)
                 {

@@ -12,8 +12,7 @@ impl Search<'_> {
     /// Effects with every curve along the travel of a joint resolved into other names at that joint, where these say more than it.
     ///
     /// Names come one by one, and no two of them need say as much as a curve of eight orders: only together do they.
-    /// `most_wild`: as [`folds::useful`] asks of each.
-    pub fn unfolded(&self, in_model: Vec<ModelTerm>, most_wild: f64) -> Vec<ModelTerm> {
+    pub fn unfolded(&self, in_model: Vec<ModelTerm>) -> Vec<ModelTerm> {
         let is_curve = |effect: &ModelTerm| {
             let candidate = &self.candidates[effect.candidate];
             discrepancy::is_curve(candidate) && effect.score.coefficients >= discrepancy::BENDS
@@ -21,7 +20,7 @@ impl Search<'_> {
         let mut in_model = in_model;
         let mut i = 0;
         while i < in_model.len() {
-            match is_curve(&in_model[i]).then(|| self.resolved(&in_model, i, most_wild)).flatten() {
+            match is_curve(&in_model[i]).then(|| self.resolved(&in_model, i)).flatten() {
                 Some(names) => in_model = names,
                 None => i += 1,
             }
@@ -30,7 +29,7 @@ impl Search<'_> {
     }
 
     /// Effects with others in the place of curve `i`; `None` where they say no more.
-    fn resolved(&self, in_model: &[ModelTerm], i: usize, most_wild: f64) -> Option<Vec<ModelTerm>> {
+    fn resolved(&self, in_model: &[ModelTerm], i: usize) -> Option<Vec<ModelTerm>> {
         let curve = &in_model[i];
         let others = all_but(in_model, Some(i));
         let alone = self.beside_names(&others);
@@ -56,7 +55,7 @@ impl Search<'_> {
             names.push(ModelTerm { near, ..entered });
             sum += weight;
             let resolved = [others.as_slice(), &names].concat();
-            let is_useful = || folds::useful(self, &resolved, most_wild).len() == resolved.len();
+            let is_useful = || folds::useful(self, &resolved).len() == resolved.len();
             // Beside the shapes of the others each has to stand out by itself.
             let stands_out = |i: usize| {
                 let own = |r: &Hypothesis| r.candidate == resolved[i].candidate && r.weight > ENTER;
