@@ -1,0 +1,273 @@
+"""Cases: a machine, its paths, what is concealed, what MuJoCo makes of it, and the files that hold it."""
+import hashlib
+import json
+import pathlib
+import time
+
+import numpy as np
+
+import paths
+import physics
+from machine import Machine, quaternion
+from paths import EVERY, STEP
+from physics import Scene
+from plant import Bare, Drive, Plant, bodies
+
+BAR_NOISE, ARM_NOISE = 0.4e-6, 20e-6
+# One round: every kind on a machine with a ballbar, the kinds that show at rest on an arm.
+ROUND = [("mill", k) for k in ["clean", *physics.GROUPS]] + [("arm", k) for k in ["clean", "play", "play_held", "friction|lugre", "flex|weight", "cogging"]]
+MOVE, SETTLE = np.radians(75), 1.2
+
+
+def streams(release, *key):
+    words = np.frombuffer(hashlib.sha256(release.encode()).digest(), np.uint32)
+    return np.random.default_rng(np.random.SeedSequence([int(w) for w in words], spawn_key=key))
+
+
+def fleet(folder):
+    machines = [Machine(p) for p in sorted(pathlib.Path(folder).glob("*.ron"))]
+    mills = [m for m in machines if m.plain and m.drives_a_point()]
+    arms = [m for m in machines if m.plain and not m.drives_a_point() and len(m.joints) >= 4]
+    return {"mill": mills, "arm": arms}
+
+
+def plan(release, fleet, count):
+    """What each case is: kind of machine, machine, kind of physics."""
+    out, turn = [], {"mill": 0, "arm": 0}
+    orders = {"mill": [], "arm": []}
+    while len(out) < count:
+        rng = streams(release, 0, len(out))
+        for at in rng.permutation(len(ROUND)):
+            sort, kind = ROUND[at]
+            if not orders[sort]:
+                orders[sort] = list(rng.permutation(len(fleet[sort])))
+            out.append((sort, orders[sort].pop(0), str(rng.choice(kind.split("|")))))
+    return out[:count]
+
+
+class Course:
+    """Commands of one recording on the simulator's steps, and the steps at which samples are taken."""
+
+    def __init__(self, q, wanted, direction=None):
+        self.q, self.wanted, self.direction = q, wanted, direction
+
+    def part(self):
+        q = self.q[self.wanted]
+        if self.direction is not None:
+            return q, np.zeros_like(q), np.zeros_like(q), self.direction
+        rate = np.gradient(self.q, STEP, axis=0)
+        gain = np.gradient(rate, STEP, axis=0)
+        rate, gain = rate[self.wanted], gain[self.wanted]
+        side = np.sign(rate) * (np.abs(rate) > 1e-4 * np.abs(rate).max(0))
+        for k in range(1, len(side)):
+            side[k] = np.where(side[k] == 0, side[k - 1], side[k])
+        return q, rate, gain, side
+
+
+def bar_courses(rng, machine):
+    bar = paths.Bar(rng, machine)
+    styles = [*rng.permutation(["blocks", "waves"]), str(rng.choice(["blocks", "waves"]))]
+    out = []
+    for style in styles:
+        for _ in range(40):
+            found = paths.ballbar(rng, machine, bar, style)
+            if found:
+                break
+        else:
+            return None
+        q, first = found
+        out.append(Course(q, np.arange(first, len(q), EVERY)))
+    return bar, out
+
+
+def arm_courses(rng, machine, counts):
+    out = []
+    for n in counts:
+        at = paths.poses(rng, machine, n + 1)
+        at = np.round(at, 8)
+        pieces, wanted, now = [np.repeat(at[:1], int(1 / STEP), 0)], [], int(1 / STEP)
+        for before, after in zip(at, at[1:]):
+            speeds = np.array([MOVE if f.kind == "R" else 0.4 for f in machine.joints])
+            last = max(np.max(np.abs(after - before) / speeds), 0.4)
+            x = np.arange(0, last + SETTLE, STEP) / last
+            pieces.append(before + paths.eased(x)[:, None] * (after - before))
+            now += len(x)
+            wanted.append(now - 1)
+        out.append(Course(np.vstack(pieces), np.array(wanted), np.sign(np.diff(at, axis=0))))
+    return out
+
+
+def make_case(release, fleet, index, sort, which, kind):
+    """Tries until something is there to be found: at an axis that carries it, and large enough."""
+    for attempt in range(60):
+        rng = streams(release, 1, index, attempt)
+        machines = fleet[sort]
+        # After many tries another machine.
+        machine = machines[(which + attempt // 6) % len(machines)]
+        made = attempt_case(rng, machine, sort, kind)
+        if made:
+            return made | {"attempts": attempt + 1}
+    raise SystemExit(f"case {index}: {kind} cannot be put into any machine of this kind")
+
+
+def attempt_case(rng, machine, sort, kind):
+    mill = sort == "mill"
+    if mill:
+        found = bar_courses(rng, machine)
+        if not found:
+            return None
+        bar, courses = found
+        on_tool, on_workpiece, measurement = bar.on_tool, bar.on_workpiece, "distance"
+    else:
+        courses = arm_courses(rng, machine, (int(rng.integers(260, 400)), 120))
+        on_tool, on_workpiece = np.round(rng.uniform(-0.03, 0.03, 3) + [0, 0, 0.05], 3), np.zeros(3)
+        measurement = str(rng.choice(["position", "pose"]))
+    geometry = machine.tolerance * np.clip(rng.normal(size=len(machine.tolerance)), -2, 2)
+    masses = bodies(rng, machine)
+    bare = Bare(machine, masses)
+    parts = [c.part() for c in courses]
+    scene = Scene(machine, parts[:-1], on_tool, on_workpiece, geometry, measurement if mill else "position")
+    inertia = bare.inertia(scene.q[::max(len(scene.q) // 200, 1)])
+    drives = [Drive(pace=2 * np.pi * rng.uniform(28, 45), rotor=rng.uniform(1, 3) if f.kind == "R" else rng.uniform(0.3, 1.0),
+                    weight=rng.uniform(0.93, 1.0) if mill else rng.uniform(0.985, 1.0)) for f in machine.joints]
+    concealed, physic = [], []
+    if kind != "clean":
+        kinds = [kind]
+        if rng.random() < 0.35:
+            others = [k for k in (physics.GROUPS if mill else physics.SETTLED) if physics.GROUPS[k] != physics.GROUPS[kind]]
+            kinds.append(str(rng.choice(others)))
+        free = list(rng.permutation(len(machine.joints)))
+        for k in kinds:
+            wanted = float(np.exp(rng.uniform(*np.log((2.5e-6, 12e-6) if mill else (40e-6, 160e-6)))))
+            for j in list(free):
+                told = physics.put(rng, k, j, drives[j], scene, bare, inertia[j], wanted)
+                if told:
+                    free.remove(j)
+                    concealed.append([physics.NAMED[k], machine.names[j]])
+                    physic.append({"kind": k, "at": machine.names[j], "wanted_um": round(wanted * 1e6, 2)} | told)
+                    break
+                # What was begun is taken back.
+                drives[j] = Drive(pace=drives[j].pace, rotor=drives[j].rotor, weight=drives[j].weight)
+            else:
+                if k == kind:
+                    return None
+    plant = Plant(machine, geometry, masses, drives, inertia, on_tool, on_workpiece)
+    loads = []
+    for c in courses:
+        plant.rest(c.q[0])
+        loads.append(plant.drive(plant.controls(c.q), c.wanted))
+        if not np.isfinite(loads[-1]).all() or np.abs(loads[-1] - c.q[c.wanted]).max() > 0.02:
+            return None
+    off = [l - c.q[c.wanted] for l, c in zip(loads, courses)]
+    seen = scene.left(scene.seen(np.vstack(off[:-1])))
+    whole = seen.sum(1)
+    share = {n: [round(float(seen[:, j] @ whole / (whole @ whole)), 4), round(float(scene.rms(seen[:, [j]])[0]) * 1e6, 3)]
+             for j, n in enumerate(machine.names)}
+    rms = float(scene.rms(whole[:, None])[0])
+    carried = [share[at][0] for _, at in concealed]
+    if concealed and (max(carried) < 0.25 or min(carried) < 0.05 or share[physic[0]["at"]][0] < 0.15 or rms < (1.5e-6 if mill else 20e-6)):
+        return None
+    if len({at for _, at in concealed}) < len(concealed):
+        return None
+    texts, clock, noisy = [], 0.0, []
+    for k, (c, l) in enumerate(zip(courses, loads)):
+        last = k + 1 == len(courses)
+        recording, readings = record(rng, machine, measurement, plant, c, l, clock, 0.0 if last else 1.0, on_tool, on_workpiece, mill, getattr(locals().get("bar"), "length", None))
+        texts.append((recording, deviations(machine, c, l, clock)))
+        noisy.append(readings)
+        clock += np.ceil(len(c.q) * STEP) + 40
+    return {"machine": machine.name, "file": machine.path.name, "measurement": measurement, "concealed": concealed, "physics": physic,
+            "samples": len(scene.q), "share_and_rms_um": share, "rms_um": round(rms * 1e6, 3),
+            "textbook_um": textbook(machine, scene, parts, courses, plant, geometry, on_tool, on_workpiece, physic, noisy), "texts": texts}
+
+
+def record(rng, machine, measurement, plant, course, loads, clock, noise, on_tool, on_workpiece, mill, length):
+    """Text of a recording, and what was read less what the machine without deviations of its joints would read."""
+    points, turns = plant.read(loads)
+    ideal, ideal_turns = plant.read(course.q[course.wanted])
+    mm = lambda x: ",".join(f"{v * 1e3:.6f}" for v in x)
+    head = [f"# machine: {machine.name}", f"# measurement: {measurement}"]
+    if np.any(on_tool):
+        head.append(f"# tool_point[mm]: {', '.join(f'{v * 1e3:g}' for v in on_tool)}")
+    if np.any(on_workpiece):
+        head.append(f"# workpiece_point[mm]: {', '.join(f'{v * 1e3:g}' for v in on_workpiece)}")
+    names = ["t[s]"] + [f"{f.joint}[{'deg' if f.kind == 'R' else 'mm'}]" for f in machine.joints]
+    if course.direction is not None:
+        names += [f"{n}_direction[1]" for n in machine.names]
+    if mill:
+        head.append(f"# nominal_length[mm]: {length * 1e3:g}")
+        names.append("d[mm]")
+        reach = lambda p: np.linalg.norm(p - on_workpiece, axis=1)
+        d = reach(points) + noise * rng.normal(size=len(points)) * BAR_NOISE
+        readings = (d - reach(ideal))[:, None]
+        columns = [f"{(x - length) * 1e3:.5f}" for x in d]
+    else:
+        points = points + noise * rng.normal(size=points.shape) * ARM_NOISE
+        readings = points - ideal
+        names += ["px[mm]", "py[mm]", "pz[mm]"]
+        columns = [",".join(f"{v * 1e3:.5f}" for v in p) for p in points]
+        if measurement == "pose":
+            names += ["qw[1]", "qx[1]", "qy[1]", "qz[1]"]
+            shake = noise * rng.normal(size=points.shape) * 50e-6
+            from machine import turned
+            columns = [f"{c},{','.join(f'{v:.8f}' for v in quaternion(t @ turned(s)))}" for c, t, s in zip(columns, turns, shake)]
+    lines = head + [",".join(names)]
+    for k, i in enumerate(course.wanted):
+        q = ",".join(f"{np.degrees(x):.6f}" if f.kind == "R" else f"{x * 1e3:.6f}" for x, f in zip(course.q[i], machine.joints))
+        side = "," + ",".join(f"{int(s)}" for s in course.direction[k]) if course.direction is not None else ""
+        lines.append(f"{clock + i * STEP:.4f},{q}{side},{columns[k]}")
+    return "\n".join(lines) + "\n", readings
+
+
+def deviations(machine, course, loads, clock):
+    """Text of what every axis really did less what it was told."""
+    off = (loads - course.q[course.wanted]) * 1e6
+    lines = [",".join(["t[s]"] + [f"{f.joint}_off[{'urad' if f.kind == 'R' else 'um'}]" for f in machine.joints])]
+    lines += [f"{clock + i * STEP:.4f}," + ",".join(f"{x:.3f}" for x in row) for i, row in zip(course.wanted, off)]
+    return "\n".join(lines) + "\n"
+
+
+def textbook(machine, scene, parts, courses, plant, geometry, on_tool, on_workpiece, physic, noisy):
+    """The judge's path with geometry alone, and with the one textbook column, of the axis that is at fault, that does best there."""
+    judge = Scene(machine, parts[-1:], on_tool, on_workpiece, geometry, scene.kind)
+    y, z = (np.concatenate([r.ravel() for r in rs]) for rs in (noisy[:-1], noisy[-1:]))
+    forces = [plant.bare.force(s.q) for s in (scene, judge)]
+
+    def error(shapes, j):
+        a, b = ([(s.joints[:, :, j] * x[:, None]).ravel() for x in xs] for s, xs in zip((scene, judge), shapes)) if shapes else ([], [])
+        sizes = np.array([max(np.linalg.norm(x), 1e-30) for x in a])
+        left = np.column_stack([scene.columns] + [x / n for x, n in zip(a, sizes)])
+        right = np.column_stack([judge.columns] + [x / n for x, n in zip(b, sizes)])
+        x = np.linalg.lstsq(left, y, rcond=1e-6)[0]
+        return float(np.sqrt(((z - right @ x) ** 2).sum() / len(judge.q)) * 1e6)
+    out = {"plain": round(error(None, 0), 3), "column": None, "best": None}
+    for p in physic:
+        j = machine.names.index(p["at"])
+        here, there = (s.textbook(j, f, p.get("waves")) for s, f in zip((scene, judge), forces))
+        for name in here:
+            e = error((here[name], there[name]), j)
+            if out["best"] is None or e < out["best"]:
+                out |= {"column": f"{name} of {p['at']}", "best": round(e, 3)}
+    return out
+
+
+def make(folder, release, count, only, machines):
+    folder, fleet_ = pathlib.Path(folder), fleet(machines)
+    answers = folder / "answers.json"
+    known = {a["case"]: a for a in json.loads(answers.read_text())} if only and answers.exists() else {}
+    for index, (sort, which, kind) in enumerate(plan(release, fleet_, count)):
+        if only and index not in only:
+            continue
+        start, name = time.time(), f"case_{index:03}"
+        made = make_case(release, fleet_, index, sort, which, kind)
+        texts = made.pop("texts")
+        for sub in (folder / name, folder / "axes" / name, folder / "judge"):
+            sub.mkdir(parents=True, exist_ok=True)
+        for k, (recording, off) in enumerate(texts):
+            last = k + 1 == len(texts)
+            (folder / "judge" / f"{name}.csv" if last else folder / name / f"rec_{k + 1}.csv").write_text(recording)
+            (folder / "axes" / name / ("judge.csv" if last else f"rec_{k + 1}.csv")).write_text(off)
+        known[name] = {"case": name, "release": release} | made
+        answers.write_text(json.dumps([known[n] for n in sorted(known)], indent=1) + "\n")
+        print(f"{name} {made['machine']:24} {'; '.join(p['kind'] + ' ' + p['at'] for p in made['physics']) or 'clean':28} "
+              f"{made['rms_um']:8.2f} um  try {made['attempts']:2}  {time.time() - start:5.1f} s", flush=True)
