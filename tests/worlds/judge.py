@@ -79,6 +79,8 @@ def score(answer, told, plain, diagnosed):
         "parts": [[p["at"], p.get("depends_on"), p.get("modelled")] for p in parts],
         "place": bool(first) and share.get(at, 0) >= CARRIES,
         "named": bool(findings) and any(n in right for n in names(findings[0])),
+        "among": bool(findings) and any(n in right for n in names(findings[0])) or any(
+            c["at"] in kinds and c["effect"] in RIGHT[kinds[c["at"]]] for c in (findings[0]["confusable_with"] if findings else [])),
         "silent": not findings,
         "wrong": [f"{f['effect']} {f['at']}" for f in sure if abs(share.get(f["at"], 0)) < IDLE and not of_loop(f)],
         "beside": [f"{f['effect']} {f['at']}" for f in findings if not of_loop(f)],
@@ -99,7 +101,7 @@ def table(lines):
         ratios = [l["ratio"] for l in hidden if l["ratio"] is not None]
         against = [l["diagnosed_um"] / l["textbook"]["best"] for l in hidden if l["diagnosed_um"] is not None and l["textbook"]["best"]]
         out[title] = {
-            "place": of("place", hidden), "name right first": of("named", hidden), "no name told": of("silent", hidden),
+            "place": of("place", hidden), "name right first": of("named", hidden), "or among what it may be instead": of("among", hidden), "no name told": of("silent", hidden),
             "as good as the textbook column": of("as_textbook", hidden), "worse than plain": of("worse", group),
             "clean, another name than the loop's": of("beside", clean),
             "wrong names a case": sum(len(l["wrong"]) for l in group) / max(len(group), 1),

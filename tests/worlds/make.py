@@ -8,7 +8,7 @@ import numpy as np
 
 import paths
 import physics
-from machine import Machine, quaternion
+from machine import Machine, quaternion, turned
 from paths import EVERY, STEP
 from physics import Scene
 from plant import Bare, Drive, Plant, bodies
@@ -16,7 +16,7 @@ from plant import Bare, Drive, Plant, bodies
 BAR_NOISE, ARM_NOISE = 0.4e-6, 20e-6
 # One round: every kind on a machine with a ballbar, the kinds that show at rest on an arm.
 ROUND = [("mill", k) for k in ["clean", *physics.GROUPS]] + [("arm", k) for k in ["clean", "play", "play_held", "friction|lugre", "flex|weight", "cogging"]]
-MOVE, SETTLE = np.radians(75), 1.2
+MOVE, SETTLE = np.radians(120), 1.2  # of arms: peak speed is nearly twice this mean
 
 
 def streams(release, *key):
@@ -33,8 +33,7 @@ def fleet(folder):
 
 def plan(release, fleet, count):
     """What each case is: kind of machine, machine, kind of physics."""
-    out, turn = [], {"mill": 0, "arm": 0}
-    orders = {"mill": [], "arm": []}
+    out, orders = [], {"mill": [], "arm": []}
     while len(out) < count:
         rng = streams(release, 0, len(out))
         for at in rng.permutation(len(ROUND)):
@@ -117,10 +116,11 @@ def attempt_case(rng, machine, sort, kind):
         if not found:
             return None
         bar, courses = found
-        on_tool, on_workpiece, measurement = bar.on_tool, bar.on_workpiece, "distance"
+        on_tool, on_workpiece, length, measurement = bar.on_tool, bar.on_workpiece, bar.length, "distance"
     else:
         courses = arm_courses(rng, machine, (int(rng.integers(260, 400)), 120))
         on_tool, on_workpiece = np.round(rng.uniform(-0.03, 0.03, 3) + [0, 0, 0.05], 3), np.zeros(3)
+        length = None
         measurement = str(rng.choice(["position", "pose"]))
     geometry = machine.tolerance * np.clip(rng.normal(size=len(machine.tolerance)), -2, 2)
     masses = bodies(rng, machine)
@@ -128,8 +128,9 @@ def attempt_case(rng, machine, sort, kind):
     parts = [c.part() for c in courses]
     scene = Scene(machine, parts[:-1], on_tool, on_workpiece, geometry, measurement if mill else "position")
     inertia = bare.inertia(scene.q[::max(len(scene.q) // 200, 1)])
-    drives = [Drive(pace=2 * np.pi * rng.uniform(28, 45), rotor=rng.uniform(1, 3) if f.kind == "R" else rng.uniform(0.3, 1.0),
-                    weight=rng.uniform(0.93, 1.0) if mill else rng.uniform(0.985, 1.0)) for f in machine.joints]
+    # Gears make the rotors of an arm heavier than its links.
+    drives = [Drive(pace=2 * np.pi * (rng.uniform(14, 26) if mill else rng.uniform(20, 35)), rotor=rng.uniform(0.3, 1.0) if f.kind == "P" else rng.uniform(1, 3) if mill else rng.uniform(3, 10),
+                    weight=rng.uniform(0.93, 1.0) if mill else rng.uniform(0.98, 1.0)) for f in machine.joints]
     concealed, physic = [], []
     if kind != "clean":
         kinds = [kind]
@@ -172,7 +173,7 @@ def attempt_case(rng, machine, sort, kind):
     texts, clock, noisy = [], 0.0, []
     for k, (c, l) in enumerate(zip(courses, loads)):
         last = k + 1 == len(courses)
-        recording, readings = record(rng, machine, measurement, plant, c, l, clock, 0.0 if last else 1.0, on_tool, on_workpiece, mill, getattr(locals().get("bar"), "length", None))
+        recording, readings = record(rng, machine, measurement, plant, c, l, clock, 0.0 if last else 1.0, on_tool, on_workpiece, length)
         texts.append((recording, deviations(machine, c, l, clock)))
         noisy.append(readings)
         clock += np.ceil(len(c.q) * STEP) + 40
@@ -181,7 +182,7 @@ def attempt_case(rng, machine, sort, kind):
             "textbook_um": textbook(machine, scene, parts, courses, plant, geometry, on_tool, on_workpiece, physic, noisy), "texts": texts}
 
 
-def record(rng, machine, measurement, plant, course, loads, clock, noise, on_tool, on_workpiece, mill, length):
+def record(rng, machine, measurement, plant, course, loads, clock, noise, on_tool, on_workpiece, length):
     """Text of a recording, and what was read less what the machine without deviations of its joints would read."""
     points, turns = plant.read(loads)
     ideal, ideal_turns = plant.read(course.q[course.wanted])
@@ -194,7 +195,7 @@ def record(rng, machine, measurement, plant, course, loads, clock, noise, on_too
     names = ["t[s]"] + [f"{f.joint}[{'deg' if f.kind == 'R' else 'mm'}]" for f in machine.joints]
     if course.direction is not None:
         names += [f"{n}_direction[1]" for n in machine.names]
-    if mill:
+    if length:
         head.append(f"# nominal_length[mm]: {length * 1e3:g}")
         names.append("d[mm]")
         reach = lambda p: np.linalg.norm(p - on_workpiece, axis=1)
@@ -209,7 +210,6 @@ def record(rng, machine, measurement, plant, course, loads, clock, noise, on_too
         if measurement == "pose":
             names += ["qw[1]", "qx[1]", "qy[1]", "qz[1]"]
             shake = noise * rng.normal(size=points.shape) * 50e-6
-            from machine import turned
             columns = [f"{c},{','.join(f'{v:.8f}' for v in quaternion(t @ turned(s)))}" for c, t, s in zip(columns, turns, shake)]
     lines = head + [",".join(names)]
     for k, i in enumerate(course.wanted):
@@ -231,7 +231,7 @@ def textbook(machine, scene, parts, courses, plant, geometry, on_tool, on_workpi
     """The judge's path with geometry alone, and with the one textbook column, of the axis that is at fault, that does best there."""
     judge = Scene(machine, parts[-1:], on_tool, on_workpiece, geometry, scene.kind)
     y, z = (np.concatenate([r.ravel() for r in rs]) for rs in (noisy[:-1], noisy[-1:]))
-    forces = [plant.bare.force(s.q) for s in (scene, judge)]
+    forces = [(plant.bare.force(s.q), plant.bare.force(s.q, s.rate, s.gain)) for s in (scene, judge)]
 
     def error(shapes, j):
         a, b = ([(s.joints[:, :, j] * x[:, None]).ravel() for x in xs] for s, xs in zip((scene, judge), shapes)) if shapes else ([], [])

@@ -44,10 +44,11 @@ class Scene:
         return float(self.rms(self.left((self.joints[:, :, j] * shape[:, None]).reshape(-1, 1)))[0])
 
     def textbook(self, j, force, waves=None):
-        """Columns that a book would try for one joint: name to shapes."""
-        out = {"direction": [self.direction[:, j]], "weight": [force[:, j]]}
+        """Columns that a book would try for one joint: name to shapes. `force`: of weight alone, and of motion and weight."""
+        weight, whole = force
+        out = {"direction": [self.direction[:, j]], "weight": [weight[:, j]], "flank": [np.sign(weight[:, j])]}
         if self.kind == "distance":
-            out |= {"velocity": [self.rate[:, j]], "acceleration": [self.gain[:, j]]}
+            out |= {"velocity": [self.rate[:, j]], "acceleration": [self.gain[:, j]], "flank in motion": [np.sign(whole[:, j])]}
         if waves:
             out["wave"] = [np.sin(waves * self.q[:, j]), np.cos(waves * self.q[:, j])]
         return out
@@ -83,12 +84,14 @@ def put(rng, kind, j, drive, scene, bare, inertia, wanted):
             if kind == "play_held":
                 drive.friction = 1.5 * most + 1e-3
                 told["friction"] = float(drive.friction)
-            # A little friction is everywhere; here it does not hold the load.
+            # A little friction is everywhere; here it does not hold the load against all that drives it.
             else:
-                drive.friction = 0.02 * most
+                drive.friction = float(rng.uniform(0.05, 0.6)) * most
+                told["friction"] = float(drive.friction)
         elif kind == "friction":
             drive.spring = inertia * (2 * np.pi * float(rng.uniform(80, 120))) ** 2
-            drive.friction = drive.spring * half
+            # Drive and loop both give way to it.
+            drive.friction = half / (1 / drive.spring + 1 / gains(drive, inertia)[0])
             told |= {"spring": drive.spring, "friction": drive.friction}
         elif kind == "lugre":
             coulomb = gains(drive, inertia)[0] * half
@@ -119,7 +122,7 @@ def put(rng, kind, j, drive, scene, bare, inertia, wanted):
     unit = scene.unit(j, scene.rate[:, j])
     lag = wanted / max(unit, 1e-12)
     if kind == "delay":
-        if not 0.0004 < lag < 0.03:
+        if not 0.0002 < lag < 0.03:
             return None
         drive.delay = float(lag)
     else:

@@ -98,7 +98,7 @@ def text(machine, geometry, masses, drives, inertia):
         if d.play:
             lines.append(f'<fixed name="play {name}" limited="true" range="{float(-d.play / 2)!r} {float(d.play / 2)!r}" {HARD}>' + both)
         if d.spring:
-            lines.append(f'<fixed name="spring {name}" springlength="0" stiffness="{float(d.spring)!r}" damping="{float(0.12 * np.sqrt(d.spring * inertia[j]))!r}">' + both)
+            lines.append(f'<fixed name="spring {name}" springlength="0" stiffness="{float(d.spring)!r}" damping="{float(0.3 * np.sqrt(d.spring * inertia[j]))!r}">' + both)
     lines.append("</tendon><actuator>")
     for j, d in enumerate(drives):
         kp, kv = gains(d, inertia[j])
