@@ -40,7 +40,7 @@ def names(finding):
     return [finding["effect"]] + ([f"{finding['effect']} ({form})", form] if form else [])
 
 
-def run(program, folder, machines, answer, again):
+def run(program, folder, machines, answer, again, rivals):
     case, out = answer["case"], folder / "found"
     out.mkdir(exist_ok=True)
     machine = str(pathlib.Path(machines) / answer["file"])
@@ -58,7 +58,13 @@ def run(program, folder, machines, answer, again):
         done = call("predict", model, path, "--json", "-", "--quiet")
         return json.loads(done.stdout)["rms_m"] * 1e6 if done.returncode == 0 else None
     told = json.loads(pathlib.Path(told).read_text()) if pathlib.Path(told).exists() else None
-    return score(answer, told, error(plain), error(found))
+    lines = {"kincal": score(answer, told, error(plain), error(found))}
+    if rivals:
+        from rivals import compete
+        for name, (effects, before, after) in compete(folder, machines, answer).items():
+            findings = [{"effect": e, "at": at, "probability": 1.0, "confusable_with": []} for e, at in effects]
+            lines[name] = score(answer, {"findings": findings}, before, after)
+    return lines
 
 
 def score(answer, told, plain, diagnosed):
@@ -101,6 +107,7 @@ def table(lines):
         ratios = [l["ratio"] for l in hidden if l["ratio"] is not None]
         against = [l["diagnosed_um"] / l["textbook"]["best"] for l in hidden if l["diagnosed_um"] is not None and l["textbook"]["best"]]
         out[title] = {
+            "cases": len(group),
             "place": of("place", hidden), "name right first": of("named", hidden), "or among what it may be instead": of("among", hidden), "no name told": of("silent", hidden),
             "as good as the textbook column": of("as_textbook", hidden), "worse than plain": of("worse", group),
             "clean, another name than the loop's": of("beside", clean),
@@ -111,30 +118,35 @@ def table(lines):
     return out
 
 
-def judge(folder, program, machines, jobs, only, again, json_to):
+def show(line):
+    number = lambda x: "-" if x is None else f"{x:.2f}"
+    print(f"{line['case']} {line['machine']}: {', '.join(' '.join(p) for p in line['physics']) or 'clean'} "
+          f"({', '.join(f'{n} {s:.2f}' for n, s in line['carried'].items())})\n"
+          f"    place {'yes' if line['place'] else 'no '}  name {'yes' if line['named'] else 'no '}  path {number(line['plain_um'])} -> {number(line['diagnosed_um'])} um, "
+          f"textbook {number(line['textbook']['best'])} ({line['textbook']['column']})"
+          f"{'' if line['read'] else '  not read'}{'  wrong: ' + ', '.join(line['wrong']) if line['wrong'] else ''}\n"
+          f"    told: {'; '.join(f'{e} {a} {p}' for e, a, p in line['found']) or 'no name'}"
+          f"{'; unnamed ' + '; '.join(a + ' by ' + ' and '.join(d or []) for a, d, _ in line['parts']) if line['parts'] else ''}", flush=True)
+
+
+def judge(folder, program, machines, jobs, only, again, rivals, json_to):
     folder = pathlib.Path(folder)
     answers = [a for a in json.loads((folder / "answers.json").read_text()) if not only or int(a["case"][5:]) in only]
-    lines = []
+    lines = {}
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        for line in pool.map(lambda a: run(program, folder, machines, a, again), answers):
-            lines.append(line)
-            number = lambda x: "-" if x is None else f"{x:.2f}"
-            print(f"{line['case']} {line['machine']}: {', '.join(' '.join(p) for p in line['physics']) or 'clean'} "
-                  f"({', '.join(f'{n} {s:.2f}' for n, s in line['carried'].items())})\n"
-                  f"    place {'yes' if line['place'] else 'no '}  name {'yes' if line['named'] else 'no '}  path {number(line['plain_um'])} -> {number(line['diagnosed_um'])} um, "
-                  f"textbook {number(line['textbook']['best'])} ({line['textbook']['column']})"
-                  f"{'  not read' if not line['read'] else ''}{'  wrong: ' + ', '.join(line['wrong']) if line['wrong'] else ''}\n"
-                  f"    told: {'; '.join(f'{e} {a} {p}' for e, a, p in line['found']) or 'no name'}"
-                  f"{'; unnamed ' + '; '.join(a + ' by ' + ' and '.join(d or []) for a, d, _ in line['parts']) if line['parts'] else ''}", flush=True)
-    result = table(lines)
-    print()
-    for title, rows in result.items():
-        print(f"{title}: {sum(1 for l in lines if title == 'all' or (l['measurement'] == 'distance') == (title == 'ballbar'))} cases")
+        for made in pool.map(lambda a: run(program, folder, machines, a, again, rivals), answers):
+            show(made["kincal"])
+            for who, line in made.items():
+                lines.setdefault(who, []).append(line)
+    result = {who: table(those) for who, those in lines.items()}
+    groups = [(who, title, rows) for who, titles in result.items() for title, rows in titles.items() if who == "kincal" or title == "all"]
+    for who, title, rows in groups:
+        print(f"\n{who}, {rows['cases']} cases" + ("" if title == "all" else f" with {title}"))
         for name, value in rows.items():
             if isinstance(value, list):
                 k, n, low, high = value
                 print(f"    {name:38} {k:3} of {n:3}" + (f"   {k / n:4.0%} [{low:.0%}, {high:.0%}]" if n else ""))
-            else:
+            elif name != "cases":
                 print(f"    {name:38} {'-' if value is None else f'{value:.2f}'}")
     if json_to:
-        pathlib.Path(json_to).write_text(json.dumps({"table": result, "cases": lines}, indent=1) + "\n")
+        pathlib.Path(json_to).write_text(json.dumps({"tables": result, "cases": lines}, indent=1) + "\n")

@@ -23,6 +23,7 @@ two.add_argument("--kincal", required=True, help="the program to be judged")
 two.add_argument("--jobs", type=int, default=1, help="cases at a time")
 two.add_argument("--only", type=lambda s: {int(x) for x in s.split(",")}, default=None)
 two.add_argument("--again", action="store_true", help="use what an earlier call left in FOLDER/found")
+two.add_argument("--rivals", action="store_true", help="short scripts with textbook columns, judged alike")
 two.add_argument("--json", default=None, help="where the result goes too")
 
 given = parser.parse_args()
@@ -31,4 +32,4 @@ if given.command == "make":
     make(given.folder, given.release, given.count, given.only, given.machines)
 else:
     from judge import judge
-    judge(given.folder, given.kincal, given.machines, given.jobs, given.only, given.again, given.json)
+    judge(given.folder, given.kincal, given.machines, given.jobs, given.only, given.again, given.rivals, given.json)
