@@ -89,7 +89,7 @@ def text(machine, geometry, masses, drives, inertia):
     for j, d in enumerate(drives):
         if d.two_masses():
             kind = "slide" if machine.joints[j].kind == "P" else "hinge"
-            lines.append(f'<body name="motor {machine.names[j]}" gravcomp="1"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+            lines.append(f'<body name="motor {machine.names[j]}" gravcomp="1"><inertial pos="0 0 0" mass="1e-6" diaginertia="1e-9 1e-9 1e-9"/>'
                          f'<joint name="motor {machine.names[j]}" type="{kind}" axis="1 0 0" armature="{float(d.rotor * inertia[j])!r}"/></body>')
     lines.append("</worldbody><tendon>")
     for j, d in enumerate(drives):

@@ -25,11 +25,15 @@ two.add_argument("--only", type=lambda s: {int(x) for x in s.split(",")}, defaul
 two.add_argument("--again", action="store_true", help="use what an earlier call left in FOLDER/found")
 two.add_argument("--rivals", action="store_true", help="short scripts with textbook columns, judged alike")
 two.add_argument("--json", default=None, help="where the result goes too")
+commands.add_parser("check", help="each kind of physics against what mechanics says of it")
 
 given = parser.parse_args()
 if given.command == "make":
     from make import make
     make(given.folder, given.release, given.count, given.only, given.machines)
+elif given.command == "check":
+    from check import check
+    raise SystemExit(bool(check(given.machines)))
 else:
     from judge import judge
     judge(given.folder, given.kincal, given.machines, given.jobs, given.only, given.again, given.rivals, given.json)
