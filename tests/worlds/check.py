@@ -33,7 +33,7 @@ def check(machines):
 
     def run(**what):
         drives = [Drive(pace=pace, rotor=rotor, **what) for _ in machine.joints]
-        plant = Plant(machine, machine.none, masses, drives, inertia, np.zeros(3), np.zeros(3))
+        plant = Plant(machine, machine.none, masses, drives, inertia, np.zeros(3))
         plant.rest(q[0])
         off = plant.drive(plant.controls(q), np.arange(0, len(q), EVERY))[:, 0] - q[::EVERY, 0]
         return off, gains(drives[0], inertia[0])[0]

@@ -4,11 +4,21 @@ A size is chosen at the instrument: the RMS that a textbook form of the effect w
 """
 import numpy as np
 
+from plant import gains
+
 GROUPS = {"play": "reversal", "play_held": "reversal", "friction": "reversal", "lugre": "reversal", "flex": "give", "weight": "give",
           "cogging": "wave", "delay": "late", "no_forward": "late"}
 NAMED = {"play": "backlash", "play_held": "backlash", "friction": "hysteresis", "lugre": "hysteresis", "flex": "gravity_compliance",
          "weight": "gravity_compliance", "cogging": "cyclic_error", "delay": "servo_lag", "no_forward": "servo_lag"}
 SETTLED = ["play", "play_held", "friction", "lugre", "flex", "weight", "cogging"]  # what shows where an arm rests
+
+
+def sides(rate):
+    """Direction of travel: -1 or 1, kept at rest."""
+    out = np.sign(rate) * (np.abs(rate) > 1e-4 * np.abs(rate).max(0))
+    for k in range(1, len(out)):
+        out[k] = np.where(out[k] == 0, out[k - 1], out[k])
+    return out
 
 
 class Scene:
@@ -61,7 +71,6 @@ def bounds(mill, turning):
 
 def put(rng, kind, j, drive, scene, bare, inertia, wanted):
     """Puts the effect into the drive of joint j, and says what it did; None if this axis cannot show it."""
-    from plant import gains
     joint = scene.machine.joints[j]
     mill, turning = scene.kind == "distance", joint.kind == "R"
     low, high = bounds(mill, turning)

@@ -150,9 +150,9 @@ class Bare:
 class Plant:
     """The machine, ready to be driven."""
 
-    def __init__(self, machine, geometry, masses, drives, inertia, on_tool, on_workpiece):
+    def __init__(self, machine, geometry, masses, drives, inertia, on_tool):
         self.machine, self.drives, self.bare = machine, drives, Bare(machine, masses)
-        self.on_tool, self.on_workpiece = on_tool, on_workpiece
+        self.on_tool = on_tool
         self.model = mujoco.MjModel.from_xml_string(text(machine, geometry, masses, drives, inertia))
         self.data = mujoco.MjData(self.model)
         self.load = np.array([self.model.joint(n).qposadr[0] for n in machine.names])

@@ -7,7 +7,7 @@ import csv
 import numpy as np
 
 from machine import Machine, inverse
-from physics import Scene
+from physics import Scene, sides
 
 UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "rad": 1.0, "deg": np.pi / 180, "s": 1.0, "1": 1.0}
 THIN = 4  # of the samples along a path the rivals take one in four: neighbours say nearly the same
@@ -39,9 +39,7 @@ class Seen:
             if self.kind == "distance":
                 rate = np.gradient(q, c["t"], axis=0)
                 gain = np.gradient(rate, c["t"], axis=0)
-                side = np.sign(rate) * (np.abs(rate) > 1e-4 * np.abs(rate).max(0))
-                for k in range(1, len(side)):
-                    side[k] = np.where(side[k] == 0, side[k - 1], side[k])
+                side = sides(rate)
                 readings.append(c["d"] + float(head["nominal_length[mm]"]) * 1e-3)
             else:
                 rate = gain = np.zeros_like(q)
