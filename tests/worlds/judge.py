@@ -22,6 +22,8 @@ RIGHT = {
 }
 # Every loop gives way a little under acceleration and weight, and follows a little late.
 LOOP = ["inertial_error", "servo_lag", "gravity_compliance"]
+# What an answer that tells no more than a name stands for.
+KINDS = {"backlash": "play", "hysteresis": "friction", "gravity_compliance": "flex", "cyclic_error": "cogging", "servo_lag": "delay"}
 SURE, CARRIES, IDLE = 0.5, 0.25, 0.05
 
 
@@ -40,9 +42,16 @@ def names(finding):
     return [finding["effect"]] + ([f"{finding['effect']} ({form})", form] if form else [])
 
 
+def answered(folder, out):
+    """Answers, those of other simulators with what they leave out."""
+    for a in json.loads((folder / "answers.json").read_text()):
+        head = next((folder / a["case"]).glob("rec_*.csv")).read_text()[:400]
+        yield {"file": f"{a['machine']}.ron", "measurement": head.split("# measurement: ")[1].split()[0], "found": out,
+               "physics": [{"kind": KINDS[name], "at": at} for name, at in a["concealed"]], "textbook_um": {"plain": None, "best": None, "column": None}} | a
+
+
 def run(program, folder, machines, answer, again, rivals):
-    case, out = answer["case"], folder / "found"
-    out.mkdir(exist_ok=True)
+    case, out = answer["case"], answer["found"]
     machine = str(pathlib.Path(machines) / answer["file"])
     recordings = sorted(str(p) for p in (folder / case).glob("rec_*.csv"))
     path, plain, found, told = (str(p) for p in (folder / "judge" / f"{case}.csv", out / f"{case}.plain.ron", out / f"{case}.found.ron", out / f"{case}.json"))
@@ -109,7 +118,7 @@ def table(lines):
         out[title] = {
             "cases": len(group),
             "place": of("place", hidden), "name right first": of("named", hidden), "or among what it may be instead": of("among", hidden), "no name told": of("silent", hidden),
-            "as good as the textbook column": of("as_textbook", hidden), "worse than plain": of("worse", group),
+            "as good as the textbook column": of("as_textbook", [l for l in hidden if l["textbook"]["best"]]), "worse than plain": of("worse", group),
             "clean, another name than the loop's": of("beside", clean),
             "wrong names a case": sum(len(l["wrong"]) for l in group) / max(len(group), 1),
             "diagnosed / plain, median": statistics.median(ratios) if ratios else None,
@@ -129,9 +138,11 @@ def show(line):
           f"{'; unnamed ' + '; '.join(a + ' by ' + ' and '.join(d or []) for a, d, _ in line['parts']) if line['parts'] else ''}", flush=True)
 
 
-def judge(folder, program, machines, jobs, only, again, rivals, json_to):
+def judge(folder, program, machines, jobs, only, again, rivals, found, json_to):
     folder = pathlib.Path(folder)
-    answers = [a for a in json.loads((folder / "answers.json").read_text()) if not only or int(a["case"][5:]) in only]
+    found = pathlib.Path(found or folder / "found")
+    found.mkdir(parents=True, exist_ok=True)
+    answers = [a for a in answered(folder, found) if not only or a["case"] in only]
     lines = {}
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for made in pool.map(lambda a: run(program, folder, machines, a, again, rivals), answers):
@@ -139,7 +150,7 @@ def judge(folder, program, machines, jobs, only, again, rivals, json_to):
             for who, line in made.items():
                 lines.setdefault(who, []).append(line)
     result = {who: table(those) for who, those in lines.items()}
-    groups = [(who, title, rows) for who, titles in result.items() for title, rows in titles.items() if who == "kincal" or title == "all"]
+    groups = [(who, title, rows) for who, titles in result.items() for title, rows in titles.items() if rows["cases"] and (who == "kincal" or title == "all")]
     for who, title, rows in groups:
         print(f"\n{who}, {rows['cases']} cases" + ("" if title == "all" else f" with {title}"))
         for name, value in rows.items():

@@ -21,8 +21,9 @@ two = commands.add_parser("judge", help="run kincal on every case")
 two.add_argument("folder")
 two.add_argument("--kincal", required=True, help="the program to be judged")
 two.add_argument("--jobs", type=int, default=1, help="cases at a time")
-two.add_argument("--only", type=lambda s: {int(x) for x in s.split(",")}, default=None)
-two.add_argument("--again", action="store_true", help="use what an earlier call left in FOLDER/found")
+two.add_argument("--only", type=lambda s: set(s.split(",")), default=None, help="cases, such as case_003,case_007")
+two.add_argument("--found", default=None, help="where what it says goes; FOLDER/found unless given")
+two.add_argument("--again", action="store_true", help="use what an earlier call left there")
 two.add_argument("--rivals", action="store_true", help="short scripts with textbook columns, judged alike")
 two.add_argument("--json", default=None, help="where the result goes too")
 commands.add_parser("check", help="each kind of physics against what mechanics says of it")
@@ -36,4 +37,4 @@ elif given.command == "check":
     raise SystemExit(bool(check(given.machines)))
 else:
     from judge import judge
-    judge(given.folder, given.kincal, given.machines, given.jobs, given.only, given.again, given.rivals, given.json)
+    judge(given.folder, given.kincal, given.machines, given.jobs, given.only, given.again, given.rivals, given.found, given.json)
