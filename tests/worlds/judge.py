@@ -85,7 +85,8 @@ def score(answer, told, plain, diagnosed):
     first = findings[0] if findings else parts[0] if parts else (told or {}).get("unexplained")
     at = first["at"] if first else None
     right = RIGHT[kinds[at]] if at in kinds else LOOP if share.get(at, 0) >= CARRIES else []
-    of_loop = lambda f: f["effect"] in LOOP and f["at"] in share
+    of_loop = lambda f: f["effect"] in LOOP and f.get("form") != "lateral_compliance" and f["at"] in share
+    describes = lambda f: f["at"] in kinds and any(n in RIGHT[kinds[f["at"]]] for n in names(f))
     sure = [f for f in findings if f["probability"] > SURE]
     line = {
         "case": answer["case"], "machine": answer["machine"], "measurement": answer["measurement"], "physics": [[p["kind"], p["at"]] for p in answer["physics"]],
@@ -98,6 +99,7 @@ def score(answer, told, plain, diagnosed):
             c["at"] in kinds and c["effect"] in RIGHT[kinds[c["at"]]] for c in (findings[0]["confusable_with"] if findings else [])),
         "silent": not findings,
         "wrong": [f"{f['effect']} {f['at']}" for f in sure if abs(share.get(f["at"], 0)) < IDLE and not of_loop(f)],
+        "amiss": [f"{f['effect']} {f['at']}" for f in sure if abs(share.get(f["at"], 0)) >= IDLE and not of_loop(f) and not describes(f)],
         "beside": [f"{f['effect']} {f['at']}" for f in findings if not of_loop(f)],
         "plain_um": plain, "diagnosed_um": diagnosed, "textbook": answer["textbook_um"],
     }
@@ -121,6 +123,7 @@ def table(lines):
             "as good as the textbook column": of("as_textbook", [l for l in hidden if l["textbook"]["best"]]), "worse than plain": of("worse", group),
             "clean, another name than the loop's": of("beside", clean),
             "wrong names a case": sum(len(l["wrong"]) for l in group) / max(len(group), 1),
+            "names amiss a case": sum(len(l["amiss"]) for l in group) / max(len(group), 1),
             "diagnosed / plain, median": statistics.median(ratios) if ratios else None,
             "diagnosed / textbook, median": statistics.median(against) if against else None,
         }
@@ -133,7 +136,7 @@ def show(line):
           f"({', '.join(f'{n} {s:.2f}' for n, s in line['carried'].items())})\n"
           f"    place {'yes' if line['place'] else 'no '}  name {'yes' if line['named'] else 'no '}  path {number(line['plain_um'])} -> {number(line['diagnosed_um'])} um, "
           f"textbook {number(line['textbook']['best'])} ({line['textbook']['column']})"
-          f"{'' if line['read'] else '  not read'}{'  wrong: ' + ', '.join(line['wrong']) if line['wrong'] else ''}\n"
+          f"{'' if line['read'] else '  not read'}{'  wrong: ' + ', '.join(line['wrong']) if line['wrong'] else ''}{'  amiss: ' + ', '.join(line['amiss']) if line['amiss'] else ''}\n"
           f"    told: {'; '.join(f'{e} {a} {p}' for e, a, p in line['found']) or 'no name'}"
           f"{'; unnamed ' + '; '.join(a + ' by ' + ' and '.join(d or []) for a, d, _ in line['parts']) if line['parts'] else ''}", flush=True)
 
