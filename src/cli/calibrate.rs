@@ -17,6 +17,7 @@ use super::files::Output;
 use super::output::{
     Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, table, write_whole,
 };
+use super::report::{Frame, Measured, Source, of_measured, write_page};
 use super::verdict;
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -52,6 +53,9 @@ pub(crate) struct Args {
     /// Where to write the calibrated machine
     #[arg(short, long, value_name = "CALIBRATED.ron")]
     output: Option<Output>,
+    /// Where to write the report with its pictures: one HTML file
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<Output>,
     /// How to walk to the optimum
     #[arg(long, value_enum, default_value = "lm")]
     solver: SolverWord,
@@ -179,14 +183,30 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let notes = verdict::of_recordings(&machine, &recordings, args.force, &|text| progress.say(text))?;
     fit.warnings.extend(notes);
     let note = verdict::of_fit(&machine, &recordings, &fit, args.force, &|text| progress.say(text))?;
-    drop(progress);
     let mut text = render(&fit, args.all);
-    if let Some(note) = note {
+    if let Some(note) = &note {
         let _ = writeln!(text, "note: {note}");
     }
+    let page = match &args.report {
+        None => None,
+        Some(_) => {
+            progress.say("drawing the report");
+            let mut sources = vec![Source::of("machine", &args.machine)];
+            sources.extend(args.recordings.iter().map(|path| Source::of("recording", path)));
+            let notes = fit.warnings.iter().cloned().chain(note).collect();
+            let geometry = (&calibrated, &fit);
+            let measured = Measured { machine: &machine, recordings: &recordings, geometry, diagnosis: None };
+            Some(of_measured(&measured, &Frame { command: "kincal calibrate", sources, notes })?)
+        }
+    };
+    drop(progress);
     if let Some(path) = &args.output {
         write_machine(path, &calibrated)?;
         let _ = writeln!(text, "\nwritten to {}", path.display());
+    }
+    if let (Some(path), Some(page)) = (&args.report, page) {
+        write_page(path, &page)?;
+        let _ = writeln!(text, "\nreport written to {}", path.display());
     }
     args.common.say(&text)?;
     args.common.write_json(&fit)

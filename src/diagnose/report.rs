@@ -205,6 +205,7 @@ pub(super) fn report(
             let left = rms_of(search, &left_over, quantity == Quantity::Angle);
             by_model(linear.fit.rms[quantity], left)
         }),
+        geometry_numbers: linear.fit.combinations.iter().filter(|c| c.share > 0.5).count() as u64,
         held_out_rms: ByQuantity::default(),
         set_ups_left_out,
         shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
