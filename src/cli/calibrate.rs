@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
+use crate::circular::{CircularTest, circular_tests};
 use crate::identify::{CalibrateOptions, ErrorModel, Figures, Fit, Loss, Solver, calibrate_model};
 use crate::machine::JointKind;
 use crate::machine::Machine;
@@ -17,7 +18,7 @@ use super::files::Output;
 use super::output::{
     Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, table, write_whole,
 };
-use super::report::{Frame, Measured, Source, of_measured, write_page};
+use super::report::{self, Action, Frame, Measured, Source, of_measured, write_page};
 use super::verdict;
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -172,6 +173,16 @@ impl Args {
     }
 }
 
+/// What is told in JSON.
+#[derive(serde::Serialize)]
+struct Told<'a> {
+    verdict: String,
+    #[serde(flatten)]
+    fit: &'a Fit,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    circular_tests: &'a [CircularTest],
+}
+
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
@@ -187,6 +198,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(note) = &note {
         let _ = writeln!(text, "note: {note}");
     }
+    let circular = circular_tests(&calibrated, &recordings)?;
     let page = match &args.report {
         None => None,
         Some(_) => {
@@ -195,7 +207,8 @@ pub(crate) fn run(args: &Args) -> Outcome {
             sources.extend(args.recordings.iter().map(|path| Source::of("recording", path)));
             let notes = fit.warnings.iter().cloned().chain(note).collect();
             let geometry = (&calibrated, &fit);
-            let measured = Measured { machine: &machine, recordings: &recordings, geometry, diagnosis: None };
+            let (machine, recordings, circular) = (&machine, &recordings[..], &circular[..]);
+            let measured = Measured { machine, recordings, geometry, diagnosis: None, circular };
             Some(of_measured(&measured, &Frame { command: "kincal calibrate", sources, notes })?)
         }
     };
@@ -209,7 +222,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         let _ = writeln!(text, "\nreport written to {}", path.display());
     }
     args.common.say(&text)?;
-    args.common.write_json(&fit)
+    args.common.write_json(&Told { verdict: report::of_fit(&fit), fit: &fit, circular_tests: &circular })
 }
 
 fn command(machine: &Machine, name: &str) -> Outcome<usize> {
@@ -310,7 +323,8 @@ const MOSTLY: f64 = 0.7;
 /// The result as people read it.
 pub(crate) fn render(fit: &Fit, all: bool) -> String {
     let recordings = count(fit.recordings.len() as u64, "recording", "recordings");
-    let mut text = format!("{}: {} in {recordings}", fit.machine, count(fit.samples, "sample", "samples"));
+    let mut text = format!("{}\n\n", report::of_fit(fit));
+    let _ = write!(text, "{}: {} in {recordings}", fit.machine, count(fit.samples, "sample", "samples"));
     if fit.dropped > 0 {
         let _ = write!(text, ", {} left out as drop-outs", count(fit.dropped, "row", "rows"));
     }
@@ -365,6 +379,13 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         fit.combinations.len() - seen
     );
     text.push_str(&super::location::render_location_errors(&fit.location_errors));
+    let list = report::actions(None, &fit.location_errors);
+    if !list.is_empty() {
+        text.push_str("\nwhat to do\n");
+    }
+    for Action { what, remedy } in list {
+        let _ = writeln!(text, "  {what}\n    {remedy}");
+    }
     for suspect in fit.suspects.iter().take(5) {
         let _ = writeln!(
             text,

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use crate::circular::circular_tests;
 use crate::demo::{REFERENCE, demo};
 
 use super::files::Output;
@@ -41,6 +42,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         recordings: &recordings,
         geometry: (&demo.calibrated, &demo.fit),
         diagnosis: Some((&demo.diagnosis, Some(&demo.diagnosed))),
+        circular: &circular_tests(&demo.diagnosed, &recordings)?,
     };
     let frame = Frame { command: "kincal demo", sources, notes: Vec::new() };
     let page = of_measured(&measured, &frame)?;

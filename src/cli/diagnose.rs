@@ -3,16 +3,17 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use crate::diagnose::{DiagnoseOptions, diagnose};
+use crate::circular::{CircularTest, circular_tests};
+use crate::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use crate::effects::Library;
 use crate::feature::as_seen_in;
-use crate::identify::calibrate;
+use crate::identify::{calibrate, declared};
 use crate::machine::Machine;
 
 use super::Common;
 use super::files::Output;
 use super::output::{Outcome, open_machine, open_recordings, write_whole};
-use super::report::{Frame, Measured, Source, of_measured, render, write_page};
+use super::report::{Frame, Measured, Source, of_diagnosis, of_measured, render, write_page};
 use super::verdict;
 
 #[derive(clap::Args)]
@@ -40,6 +41,16 @@ pub(crate) struct Args {
     force: bool,
     #[command(flatten)]
     common: Common,
+}
+
+/// What is told in JSON.
+#[derive(serde::Serialize)]
+struct Told<'a> {
+    verdict: String,
+    #[serde(flatten)]
+    diagnosis: &'a Diagnosis,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    circular_tests: &'a [CircularTest],
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
@@ -80,20 +91,26 @@ pub(crate) fn run(args: &Args) -> Outcome {
     for note in &notes {
         let _ = writeln!(text, "note: {note}");
     }
+    // Where a set-up has to be found first, the angles are those of the machine as declared.
+    let circular = match &model {
+        Some(model) => circular_tests(model, &recordings)?,
+        None => circular_tests(&declared(&machine, &recordings)?, &recordings)?,
+    };
     let page = match &args.report {
         None => None,
         Some(_) => {
             progress.say("drawing the report");
             let seen = as_seen_in(&machine, &recordings);
-            let (calibrated, fit) = calibrate(&seen, &recordings, request.options)?;
+            let (geometry, fit) = calibrate(&seen, &recordings, request.options)?;
             let mut sources = vec![Source::of("machine", &args.machine)];
             sources.extend(args.recordings.iter().map(|path| Source::of("recording", path)));
             sources.extend(args.effects.iter().map(|path| Source::of("effects", path)));
             let measured = Measured {
                 machine: &seen,
                 recordings: &recordings,
-                geometry: (&calibrated, &fit),
+                geometry: (&geometry, &fit),
                 diagnosis: Some((&diagnosis, model.as_ref())),
+                circular: &circular,
             };
             Some(of_measured(&measured, &Frame { command: "kincal diagnose", sources, notes })?)
         }
@@ -112,5 +129,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
         let _ = writeln!(text, "\nreport written to {}", path.display());
     }
     args.common.say(&text)?;
-    args.common.write_json(&diagnosis)
+    args.common.write_json(&Told {
+        verdict: of_diagnosis(&diagnosis),
+        diagnosis: &diagnosis,
+        circular_tests: &circular,
+    })
 }

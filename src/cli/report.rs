@@ -1,14 +1,20 @@
 //! Reports of `calibrate`, `diagnose` and `compensate`: what each says, in words and as one HTML page with pictures.
 
+mod actions;
 mod before_after;
+mod enter;
 mod findings;
 mod headline;
+mod known;
 mod page;
 mod plot;
+mod polar;
 mod provenance;
 mod residuals;
+mod skeleton;
 mod style;
 mod table;
+mod terminal;
 mod text;
 mod track;
 
@@ -18,17 +24,19 @@ use maud::{Markup, html};
 
 use super::output::{Outcome, count, write_whole};
 use crate::calibration::CalibratedMachine;
+use crate::circular::CircularTest;
 use crate::compensate;
 use crate::diagnose::Diagnosis;
-use crate::identify::{Fit, Loss, fit_setup};
+use crate::identify::{Fit, declared};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::units::Rms;
 use track::{Stage, tracks};
 
-pub(crate) use headline::{of_compensation, of_diagnosis, of_fit};
+pub(crate) use actions::{Action, actions};
+pub(crate) use headline::{of_diagnosis, of_fit};
 pub(crate) use provenance::Source;
-pub(crate) use text::render;
+pub(crate) use terminal::render;
 
 /// What all pages have.
 pub(crate) struct Frame<'a> {
@@ -48,6 +56,8 @@ pub(crate) struct Measured<'a> {
     pub geometry: (&'a CalibratedMachine, &'a Fit),
     /// The diagnosis, and the machine with what it named.
     pub diagnosis: Option<(&'a Diagnosis, Option<&'a CalibratedMachine>)>,
+    /// Recordings along circles and cones.
+    pub circular: &'a [CircularTest],
 }
 
 /// The page of a calibration or a diagnosis.
@@ -55,22 +65,27 @@ pub(crate) struct Measured<'a> {
 /// # Errors
 /// If a recording cannot be read again.
 pub(crate) fn of_measured(measured: &Measured, frame: &Frame) -> crate::error::Result<String> {
-    let Measured { machine, recordings, geometry: (calibrated, fit), diagnosis } = measured;
-    let declared = fit_setup(&CalibratedMachine::nominal((*machine).clone()), recordings, Loss::Squares)?;
+    let Measured { machine, recordings, geometry: (calibrated, fit), diagnosis, circular } = measured;
+    let declared = declared(machine, recordings)?;
     let mut stages = vec![
         Stage { name: "as declared", calibrated: &declared },
         Stage { name: "geometry calibrated", calibrated },
     ];
     let named = diagnosis.filter(|(found, _)| found.has_more_than_geometry()).and_then(|(_, named)| named);
     if let Some(named) = named {
-        stages.push(Stage { name: "and what was found", calibrated: named });
+        stages.push(Stage { name: "with what was found", calibrated: named });
     }
     let names: Vec<&'static str> = stages.iter().map(|stage| stage.name).collect();
     let found = diagnosis.map(|(found, _)| found);
+    let location = found.map_or(&fit.location_errors, |found| &found.location_errors);
     let (tracks, figures) = tracks(machine, recordings, &stages)?;
-    let verdict = found.map_or_else(|| of_fit(fit), of_diagnosis);
-    let samples = found.map_or(fit.samples, |found| found.samples);
-    let mut sections = vec![before_after::before_after(&figures, &names, &totals(fit, found))];
+    let still = still(machine, recordings)?;
+    let still: Vec<&str> = still.iter().map(String::as_str).collect();
+    let mut sections = vec![
+        actions::to_do(&actions(found, location)),
+        before_after::before_after(&figures, &names, &totals(fit, found)),
+        polar::circular(circular, &tracks, names.last().copied().unwrap_or_default()),
+    ];
     if let Some(found) = found {
         sections.push(findings::found(found));
     }
@@ -78,16 +93,35 @@ pub(crate) fn of_measured(measured: &Measured, frame: &Frame) -> crate::error::R
     if let Some(found) = found {
         sections.push(findings::left(found));
     }
-    sections.push(findings::geometry(found.map_or(&fit.location_errors, |found| &found.location_errors)));
-    sections.push(notes(&frame.notes));
-    sections.push(provenance::provenance(&frame.sources, recordings, frame.command));
+    sections.extend([
+        findings::geometry(location),
+        enter::to_enter(named.unwrap_or(calibrated)),
+        known::uncertainty(fit),
+        known::unseen(fit, found),
+        known::next(fit, found, &still),
+        skeleton::skeleton(machine),
+        notes(&frame.notes),
+        provenance::provenance(&frame.sources, recordings, frame.command),
+    ]);
+    let verdict = found.map_or_else(|| of_fit(fit), of_diagnosis);
+    let samples = found.map_or(fit.samples, |found| found.samples);
     let what = if found.is_some() { "Diagnosis" } else { "Calibration" };
     let subtitle = format!(
-        "{} in {}.",
+        "Root mean square of {} in {}.",
         count(samples, "sample", "samples"),
         count(recordings.len() as u64, "recording", "recordings")
     );
     Ok(page::page(&format!("{what} of {}", machine.name()), &verdict, &subtitle, &sections))
+}
+
+/// Commands that no recording moves.
+fn still(machine: &Machine, recordings: &[Recording]) -> crate::error::Result<Vec<String>> {
+    let mut moved = vec![false; machine.commands().len()];
+    for recording in recordings {
+        moved.iter_mut().zip(recording.scan()?.moving).for_each(|(moved, own)| *moved |= own);
+    }
+    let names = machine.commands().iter().zip(moved);
+    Ok(names.filter(|(_, moved)| !moved).map(|(name, _)| name.clone()).collect())
 }
 
 /// Over all recordings, by model, as text and JSON have them.
@@ -131,12 +165,50 @@ pub(crate) fn of_compensated(
     let machine = calibrated.machine();
     let sections = [
         html! { h2 { "What was done" } ul { @for line in told.lines() { li { (line) } } } },
+        corrections(report),
+        enter::to_enter(calibrated),
+        skeleton::skeleton(machine),
         notes(&frame.notes),
         provenance::provenance(&frame.sources, &[], frame.command),
     ];
     let subtitle =
         format!("{}, {}.", count(report.blocks, "line", "lines"), count(report.moves, "move", "moves"));
-    page::page(&format!("Compensation on {}", machine.name()), &of_compensation(report), &subtitle, &sections)
+    page::page(
+        &format!("Compensation on {}", machine.name()),
+        &headline::of_compensation(report),
+        &subtitle,
+        &sections,
+    )
+}
+
+/// How far the tip is off before and after, and what of it nobody has measured.
+fn corrections(report: &compensate::Report) -> Markup {
+    let rows = [
+        ("before: largest correction of the tip", report.largest_correction_m),
+        ("after: left at the end of a move", report.largest_left_m),
+        ("after: left along a straight move", report.largest_mid_line_m),
+        ("after: left where lines stand for an arc", report.largest_arc_m),
+        ("after: left by drilling cycles", report.largest_cycle_m),
+        ("step where a direction of travel changes", report.largest_reversal_m),
+    ];
+    let rows: Vec<_> = rows.into_iter().filter(|(_, worst)| worst.line > 0).collect();
+    let unit = table::residual_unit(false, table::largest(rows.iter().map(|(_, worst)| worst.value)));
+    let row = |(what, worst): &(&str, compensate::Worst)| {
+        let line = table::written(worst.line.to_string(), worst.line as f64);
+        vec![table::word(*what), table::number(worst.value, unit), line]
+    };
+    let seen = report.unseen.as_ref().filter(|unseen| !unseen.patterns.is_empty());
+    html! {
+        h2 { "Before and after" }
+        (table::table(&["what", &format!("at the tip, {}", unit.symbol), "line"], rows.iter().map(row).collect()))
+        @if let Some(unseen) = seen {
+            h2 { "What could not be seen" }
+            p { "One standard deviation of the tip over these moves that no recording has shown: " (super::output::length(unseen.tip_m)) "." }
+            ul { @for pattern in unseen.patterns.iter().take(8) {
+                li { (pattern.mostly.join(" with ")) ": " (super::output::length(pattern.tip_m)) }
+            } }
+        }
+    }
 }
 
 /// Writes a page, whole or not at all.

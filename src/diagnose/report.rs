@@ -404,6 +404,8 @@ fn finding(
         form: (candidate.told_as != candidate.effect).then(|| candidate.effect.clone()),
         at: candidate.place.name(machine),
         explanation: identified.sentence(machine, &sizes),
+        cause: family.cause.clone(),
+        remedy: identified.remedy(machine, &sizes),
         coefficients: sizes
             .into_iter()
             .map(|s| Size {

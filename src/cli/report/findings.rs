@@ -136,6 +136,7 @@ fn against(curve: &Curve, finding: Option<&Finding>, most: usize) -> Markup {
             (1f64.to_degrees(), format!("position of {name}, deg"), &name[..])
         }
         Along::Joint { name, angle: false } => (1e3, format!("position of {name}, mm"), &name[..]),
+        Along::Load { name } => (1.0, format!("load of {name} by gravity"), &name[..]),
         Along::Time => (1.0, "time, s".to_string(), ""),
         Along::Sample => (1.0, "sample".to_string(), ""),
     };
@@ -158,7 +159,8 @@ fn against(curve: &Curve, finding: Option<&Finding>, most: usize) -> Markup {
             let line: Vec<(f64, f64)> = run.iter().map(|p| (p.x * x_factor, p.effect * factor)).collect();
             envelope(&line, (most * run.len()).div_ceil(points.len()).max(2))
         };
-        let marks = match is_scattered(curve) {
+        let is_cloud = is_scattered(curve) || matches!(curve.along, Along::Load { .. });
+        let marks = match is_cloud {
             true => Marks::Dots(points.iter().map(|p| (p.x * x_factor, p.effect * factor)).collect()),
             false => Marks::Lines(curve.runs.iter().filter(|run| run.len() > 1).map(line).collect()),
         };

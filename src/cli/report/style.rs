@@ -24,12 +24,15 @@ svg{display:block;width:100%;max-width:44rem;height:auto;margin:.3rem 0}svg text
 table{border-collapse:collapse;font-size:.9rem;margin:.6rem 0;max-width:100%}th,td{text-align:left;vertical-align:top;padding:.3rem .7rem;border-bottom:1px solid var(--line)}\
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}th button{font:inherit;font-weight:600;color:inherit;background:none;border:0;padding:0;cursor:pointer;text-align:inherit}\
 th button:after{content:' \\2195';color:var(--soft);font-weight:400}th[aria-sort=ascending] button:after{content:' \\2191'}th[aria-sort=descending] button:after{content:' \\2193'}\
-@media(max-width:40rem){body{margin:.6rem auto}svg text{font-size:17px}table.fold,.fold tbody,.fold tr,.fold td{display:block;width:100%}.fold thead{display:none}\
+details{margin:.5rem 0;border:1px solid var(--line);border-radius:.4rem;padding:.3rem .8rem}summary{cursor:pointer;font-weight:600}\
+@media(max-width:52rem){body{margin:.6rem auto}table.fold,.fold tbody,.fold tr,.fold td{display:block;width:100%}.fold thead{display:none}\
 .fold tr{border-bottom:2px solid var(--line);padding:.3rem 0}.fold td{border:0;padding:.1rem 0;display:flex;justify-content:space-between;gap:1rem;text-align:right;white-space:normal}\
-.fold td:before{content:attr(data-h);color:var(--soft);text-align:left;flex:none;max-width:45%}.fold td:empty{display:none}}";
+.fold td:before{content:attr(data-h);color:var(--soft);text-align:left;flex:none;max-width:45%}.fold td:empty{display:none}}\
+@media(max-width:36rem){svg text{font-size:17px}}";
 
-/// A click on a head sorts its table, once more the other way round.
+/// What is folded is printed. A click on a head sorts its table, once more the other way round.
 pub(super) const SCRIPT: &str = "\
+addEventListener('beforeprint',()=>document.querySelectorAll('details').forEach(d=>d.open=true));\
 document.querySelectorAll('th button').forEach(b=>b.onclick=()=>{const h=b.parentNode,t=h.closest('table').tBodies[0],i=h.cellIndex,\
 d=h.ariaSort==='ascending'?-1:1;[...h.parentNode.cells].forEach(c=>c.ariaSort=null);h.ariaSort=d>0?'ascending':'descending';\
 const k=r=>{const c=r.cells[i];return c.dataset.v===undefined?c.textContent:+c.dataset.v};\
