@@ -68,6 +68,8 @@ pub struct CircularTest {
     pub half_apex_rad: f64,
     /// Nominal length of the bar, m.
     pub length_m: f64,
+    /// Radial deviation of the least-squares circle, m.
+    pub radius_m: f64,
     /// Centre of the least-squares circle across the axis, m.
     pub centre_m: [f64; 2],
     /// Figures counter-clockwise about the axis.
@@ -161,6 +163,7 @@ fn circular_test(calibrated: &CalibratedMachine, recording: &Recording) -> Resul
         axis: axis.0,
         half_apex_rad: rise.clamp(-1.0, 1.0).acos(),
         length_m,
+        radius_m: 0.0,
         centre_m: [0.0; 2],
         counter_clockwise: None,
         clockwise: None,
@@ -260,7 +263,7 @@ fn with_figures(mut test: CircularTest, is_known: bool) -> CircularTest {
     test.counter_clockwise = one(&ccw);
     test.clockwise = one(&cw);
     let Some(all) = circle(&test.path) else { return test };
-    test.centre_m = [all[1], all[2]];
+    (test.radius_m, test.centre_m) = (all[0], [all[1], all[2]]);
     if test.counter_clockwise.is_some() && test.clockwise.is_some() {
         let (inner, outer) = ends(test.path.iter().map(|t| about(t, all)));
         test.g_both_m = Some(outer - inner);

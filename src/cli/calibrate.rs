@@ -384,7 +384,10 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         text.push_str("\nwhat to do\n");
     }
     for Action { what, remedy } in list {
-        let _ = writeln!(text, "  {what}\n    {remedy}");
+        for what in what {
+            let _ = writeln!(text, "  {what}");
+        }
+        let _ = writeln!(text, "    do: {remedy}");
     }
     for suspect in fit.suspects.iter().take(5) {
         let _ = writeln!(

@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::circular::circular_tests;
 use crate::demo::{REFERENCE, demo};
 
+use super::diagnose::Told;
 use super::files::Output;
 use super::output::{Outcome, length};
 use super::report::{self, Frame, Measured, Source, of_measured, write_page};
@@ -37,12 +38,13 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let mut sources = vec![Source::of_text("machine", "ac_table_tilting.ron", REFERENCE)];
     let texts = recordings.iter().zip(&demo.recordings);
     sources.extend(texts.map(|(recording, text)| Source::of_text("recording", recording.name(), text)));
+    let circular = circular_tests(&demo.diagnosed, &recordings)?;
     let measured = Measured {
         machine,
         recordings: &recordings,
         geometry: (&demo.calibrated, &demo.fit),
         diagnosis: Some((&demo.diagnosis, Some(&demo.diagnosed))),
-        circular: &circular_tests(&demo.diagnosed, &recordings)?,
+        circular: &circular,
     };
     let frame = Frame { command: "kincal demo", sources, notes: Vec::new() };
     let page = of_measured(&measured, &frame)?;
@@ -67,5 +69,6 @@ pub(crate) fn run(args: &Args) -> Outcome {
     write_page(page_path, &page)?;
     let _ = writeln!(text, "\nreport with pictures written to {}", page_path.display());
     args.common.say(&text)?;
-    args.common.write_json(&demo.diagnosis)
+    let verdict = report::of_diagnosis(&demo.diagnosis);
+    args.common.write_json(&Told { verdict, diagnosis: &demo.diagnosis, circular_tests: &circular })
 }

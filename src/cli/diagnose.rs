@@ -45,12 +45,12 @@ pub(crate) struct Args {
 
 /// What is told in JSON.
 #[derive(serde::Serialize)]
-struct Told<'a> {
-    verdict: String,
+pub(crate) struct Told<'a> {
+    pub verdict: String,
     #[serde(flatten)]
-    diagnosis: &'a Diagnosis,
+    pub diagnosis: &'a Diagnosis,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    circular_tests: &'a [CircularTest],
+    pub circular_tests: &'a [CircularTest],
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use super::table::prose;
 use super::text::{next_test, tests};
 use crate::diagnose::{Diagnosis, Finding};
 use crate::location::LocationErrors;
@@ -9,9 +10,9 @@ use crate::location::LocationErrors;
 /// A name that others may take the place of with this probability is measured first.
 const DOUBTED: f64 = 0.3;
 
-/// What is the case, and what to do.
+/// What is the case, and what to do about all of it.
 pub(crate) struct Action {
-    pub what: String,
+    pub what: Vec<String>,
     pub remedy: String,
 }
 
@@ -29,19 +30,23 @@ pub(crate) fn of_finding(finding: &Finding) -> String {
     }
 }
 
-/// Everything that can be done, the most important first.
+/// Everything that can be done, the most important first; what calls for the same stands together.
 pub(crate) fn actions(diagnosis: Option<&Diagnosis>, location: &LocationErrors) -> Vec<Action> {
-    let mut list = Vec::new();
+    let mut list: Vec<Action> = Vec::new();
+    let mut add = |what: String, remedy: String| match list.iter_mut().find(|a| a.remedy == remedy) {
+        Some(action) => action.what.push(what),
+        None => list.push(Action { what: vec![what], remedy }),
+    };
     if let Some(found) = diagnosis {
         for finding in &found.findings {
-            list.push(Action { what: finding.explanation.clone(), remedy: of_finding(finding) });
+            add(finding.explanation.clone(), of_finding(finding));
         }
         if let Some(unexplained) = &found.unexplained {
-            list.push(Action { what: unexplained.explanation.clone(), remedy: next_test(unexplained) });
+            add(unexplained.explanation.clone(), format!("measure this next: {}", next_test(unexplained)));
         }
     }
     for said in location.in_words() {
-        list.push(Action { what: format!("{} ({})", said.what, said.name), remedy: said.remedy.into() });
+        add(format!("{} ({})", said.what, said.name), said.remedy.into());
     }
     list
 }
@@ -52,7 +57,11 @@ pub(super) fn to_do(list: &[Action]) -> Markup {
         @if !list.is_empty() {
             div.card {
                 h2 { "What to do" }
-                ol.do { @for action in list { li { strong { (action.what) } br; (action.remedy) "." } } }
+                ol.do {
+                    @for action in list {
+                        li { @for what in &action.what { strong { (what) } br; } (prose(&action.remedy)) "." }
+                    }
+                }
             }
         }
     }

@@ -239,9 +239,10 @@ fn distribution(diagnosis: &Diagnosis, angle: bool) -> Markup {
 /// Location errors of the machine.
 pub(super) fn geometry(found: &LocationErrors) -> Markup {
     let of = |unit: &str| -> Vec<_> { found.errors.iter().filter(|error| error.unit == unit).collect() };
-    let table_of = |symbol: &str, kind: Kind| {
+    let table_of = |symbol: &str| {
         let own = of(symbol);
-        let unit = kind.unit(largest(own.iter().map(|error| error.value)));
+        let size = largest(own.iter().map(|error| error.value));
+        let unit = if symbol == "m" { residual_unit(false, size) } else { Kind::Angle.unit(size) };
         let row = |error: &&crate::location::LocationError| {
             vec![
                 word(&error.name),
@@ -253,7 +254,10 @@ pub(super) fn geometry(found: &LocationErrors) -> Markup {
             ]
         };
         let heads = [format!("value, {}", unit.symbol), format!("standard error, {}", unit.symbol)];
-        table(&["name", "axis", &heads[0], &heads[1], "share of the data", ""], own.iter().map(row).collect())
+        table(
+            &["name", "axis", &heads[0], &heads[1], "share of the data", "verdict"],
+            own.iter().map(row).collect(),
+        )
     };
     html! {
         h2 { "Geometry" }
@@ -264,8 +268,8 @@ pub(super) fn geometry(found: &LocationErrors) -> Markup {
                 "Location errors of ISO 230-1 (primary axis " (found.primary.as_deref().unwrap_or("-")) ", secondary "
                 (found.secondary.as_deref().unwrap_or("-")) ")."
             }
-            (table_of("rad", Kind::Angle))
-            (table_of("m", Kind::Length))
+            (table_of("rad"))
+            (table_of("m"))
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::table::{Cell, largest, number, percent, table, word};
+use super::table::{Cell, largest, number, percent, prose, residual_unit, table, word};
 use super::text::{not_tried, tests};
 use crate::cli::output::Kind;
 use crate::diagnose::Diagnosis;
@@ -12,7 +12,7 @@ use crate::identify::{Fit, ParameterFit};
 const MOSTLY: f64 = 0.7;
 const HARDLY: f64 = 0.1;
 /// Combinations that are listed.
-const LISTED: usize = 12;
+const LISTED: usize = 6;
 
 /// Deviations that come mostly from the data.
 pub(super) fn uncertainty(fit: &Fit) -> Markup {
@@ -22,8 +22,8 @@ pub(super) fn uncertainty(fit: &Fit) -> Markup {
     };
     let table_of = |lengths: bool| {
         let own = of(lengths);
-        let kind = if lengths { Kind::Length } else { Kind::Angle };
-        let unit = kind.unit(largest(own.iter().flat_map(|p| [p.value, p.std_error])));
+        let size = largest(own.iter().flat_map(|p| [p.value, p.std_error]));
+        let unit = if lengths { residual_unit(false, size) } else { Kind::Angle.unit(size) };
         let row = |p: &&ParameterFit| -> Vec<Cell> {
             let frame =
                 if p.setup.is_empty() { p.frame.clone() } else { format!("{}[{}]", p.frame, p.setup) };
@@ -71,7 +71,7 @@ pub(super) fn unseen(fit: &Fit, diagnosis: Option<&Diagnosis>) -> Markup {
              travel would see " (fit.rank_in_general) "."
         }
         @if !hidden.is_empty() {
-            p { "Of combinations of deviations they say next to nothing about " (hidden.len()) ", mostly of:" }
+            p { "Of combinations of deviations they say next to nothing about " (hidden.len()) " (frame.component, the largest of each):" }
             ul {
                 @for combination in hidden.iter().take(LISTED) { li { (combination) } }
                 @if hidden.len() > LISTED { li { "and " (hidden.len() - LISTED) " more" } }
@@ -112,9 +112,13 @@ pub(super) fn next(fit: &Fit, diagnosis: Option<&Diagnosis>, still: &[&str]) -> 
             fit.rank_in_general, fit.rank
         ));
     }
+    let hidden = fit.combinations.iter().filter(|c| c.share < HARDLY).count();
+    if hidden > 0 && fit.rank >= fit.rank_in_general {
+        add("another instrument, or another place of it: these see no more anywhere; `kincal describe MACHINE.ron` says what each kind sees".into());
+    }
     add("the same again on another day, and `kincal predict` it with the calibrated file: what holds then may be entered".into());
     html! {
         h2 { "The next measurement" }
-        ol { @for line in &list { li { (line) } } }
+        ol { @for line in &list { li { (prose(line)) } } }
     }
 }

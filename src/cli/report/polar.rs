@@ -7,8 +7,7 @@ use maud::{Markup, html};
 use super::plot::{Ink, dotted, joined, legend, thinned};
 use super::table::{Cell, largest, number, number_or_none, residual_unit, table, word};
 use super::track::Track;
-use crate::circular::{CircularTest, SeenFrom, Turned};
-use crate::cli::output::Shown;
+use crate::circular::{CircularTest, OneSense, SeenFrom, Turned};
 
 /// Half the size of a picture, the radius of the nominal circle in it, and how far the largest deviation goes from it.
 const HALF: f64 = 200.0;
@@ -26,11 +25,14 @@ pub(super) fn circular(tests: &[CircularTest], tracks: &[Track], last: &str) -> 
     html! {
         @if !tests.is_empty() {
             h2 { "Circular tests" }
-            p.note { "Radial deviation along the nominal circle or cone of the bar, magnified; outwards is longer. Figures after ISO 230-4." }
-            div.figures.small {
-                @for test in tests.iter().take(MOST_TESTS) {
-                    (picture(test, &test.path, "as measured", most))
-                    @if let Some(left) = left(test, tracks) { (picture(test, &left, &format!("left: {last}"), most)) }
+            p.note {
+                "Radial deviation along the circle or cone of the bar, magnified; outwards is longer. What was measured is drawn about its \
+                 least-squares circle, so that its shape shows: radius and centre of that are in the table."
+            }
+            @for test in tests.iter().take(MOST_TESTS) {
+                div.pair {
+                    (picture(test, &shape(test), "as measured", most))
+                    @if let Some(left) = left(test, tracks) { (picture(test, &left, &format!("left {last}"), most)) }
                 }
             }
             @if tests.len() > MOST_TESTS { p.note { "The first " (MOST_TESTS) " of " (tests.len()) " are drawn." } }
@@ -42,6 +44,13 @@ pub(super) fn circular(tests: &[CircularTest], tracks: &[Track], last: &str) -> 
             }
         }
     }
+}
+
+/// The path about its least-squares circle.
+fn shape(test: &CircularTest) -> Vec<Turned> {
+    let [x, y] = test.centre_m;
+    let about = |t: &Turned| t.deviation - test.radius_m - x * t.angle.cos() - y * t.angle.sin();
+    test.path.iter().map(|t| Turned { deviation: about(t), ..*t }).collect()
 }
 
 /// The path with what the last model leaves.
@@ -126,50 +135,52 @@ fn three(value: f64) -> String {
     format!("{value:.*}", crate::cli::output::decimals(value, 3))
 }
 
-/// Figures of all tests, in one unit.
+/// Figures of all tests: of each sense, then of both together.
 fn figures(tests: &[CircularTest]) -> Markup {
-    let senses = |test: &CircularTest| [test.counter_clockwise, test.clockwise];
-    let all = tests.iter().flat_map(|test| {
-        let own = senses(test).into_iter().flatten().flat_map(|s| [Some(s.g_m), s.f_max_m, s.f_min_m]);
-        own.chain([test.g_both_m, test.h_m, test.d_m]).flatten()
-    });
-    let unit = residual_unit(false, largest(all));
+    let senses =
+        |test: &CircularTest| [("counter-clockwise", test.counter_clockwise), ("clockwise", test.clockwise)];
+    let own = tests.iter().flat_map(|test| senses(test).into_iter().filter_map(|(_, sense)| sense));
+    let unit = residual_unit(false, largest(own.flat_map(|s| [Some(s.g_m), s.f_max_m, s.f_min_m]).flatten()));
+    let of_sense = |test: &CircularTest| -> Vec<Vec<Cell>> {
+        let row = |(name, sense): (&str, Option<OneSense>)| {
+            let sense = sense?;
+            let mut row =
+                vec![word(&test.recording), word(path_of(test)), word(name), number(sense.g_m, unit)];
+            row.extend([sense.f_max_m, sense.f_min_m].map(|x| number_or_none(x, unit)));
+            Some(row)
+        };
+        senses(test).into_iter().filter_map(row).collect()
+    };
+    let heads = ["G", "F max", "F min"].map(|name| format!("{name}, {}", unit.symbol));
+    let heads = ["recording", "path", "sense", &heads[0], &heads[1], &heads[2]];
+    let both = |test: &CircularTest| [test.g_both_m, test.h_m, test.d_m];
+    let all = tests.iter().flat_map(|test| both(test).into_iter().flatten().chain(test.centre_m));
+    let shared = residual_unit(false, largest(all));
     let row = |test: &CircularTest| -> Vec<Cell> {
-        let shape = match test.is_circle() {
-            true => "circle".to_string(),
-            false => format!("cone, {:.1} deg", 2.0 * test.half_apex_rad.to_degrees()),
-        };
-        let from = match test.seen_from {
-            SeenFrom::Workpiece => "w",
-            SeenFrom::Base => "base",
-            SeenFrom::Tool => "t",
-        };
-        let mut row = vec![word(&test.recording), word(format!("{shape} seen from {from}"))];
-        for sense in senses(test) {
-            row.push(number_or_none(sense.map(|s| s.g_m), unit));
-            row.push(number_or_none(sense.and_then(|s| s.f_max_m), unit));
-            row.push(number_or_none(sense.and_then(|s| s.f_min_m), unit));
-        }
-        row.extend([test.g_both_m, test.h_m, test.d_m].map(|x| number_or_none(x, unit)));
-        row.extend(test.centre_m.map(|x| number(x, unit)));
+        let mut row = vec![word(&test.recording)];
+        row.extend(both(test).map(|x| number_or_none(x, shared)));
+        row.extend(test.centre_m.map(|x| number(x, shared)));
         row
     };
-    let with = |name: &str, Shown { symbol, .. }: Shown| format!("{name}, {symbol}");
-    let names = [
-        "G ccw",
-        "F max ccw",
-        "F min ccw",
-        "G cw",
-        "F max cw",
-        "F min cw",
-        "G(b)",
-        "H",
-        "D",
-        "centre 0°",
-        "centre 90°",
-    ];
-    let names = names.map(|name| with(name, unit));
-    let heads: Vec<&str> =
-        ["recording", "path"].into_iter().chain(names.iter().map(String::as_str)).collect();
-    table(&heads, tests.iter().map(row).collect())
+    let names =
+        ["G(b)", "H", "D", "centre 0°", "centre 90°"].map(|name| format!("{name}, {}", shared.symbol));
+    let names: Vec<&str> = ["recording"].into_iter().chain(names.iter().map(String::as_str)).collect();
+    html! {
+        (table(&heads, tests.iter().flat_map(of_sense).collect()))
+        (table(&names, tests.iter().map(row).collect()))
+    }
+}
+
+/// `cone of 90 deg seen from w`
+fn path_of(test: &CircularTest) -> String {
+    let shape = match test.is_circle() {
+        true => "circle".to_string(),
+        false => format!("cone of {:.0} deg", 2.0 * test.half_apex_rad.to_degrees()),
+    };
+    let from = match test.seen_from {
+        SeenFrom::Workpiece => "w",
+        SeenFrom::Base => "the base",
+        SeenFrom::Tool => "t",
+    };
+    format!("{shape} seen from {from}")
 }

@@ -56,7 +56,7 @@ pub(super) fn provenance(sources: &[Source], recordings: &[Recording], command: 
         h2 { "Files" }
         (table(&["file", "name", "instrument", "FNV-1a of 64 bits"], rows))
         p.note {
-            "kincal " (env!("CARGO_PKG_VERSION")) ", `" (command) "`, " (today()) " (UTC). The fingerprint tells files apart that were mixed up; it \
+            "kincal " (env!("CARGO_PKG_VERSION")) ", " code { (command) } ", " (today()) " (UTC). The fingerprint tells files apart that were mixed up; it \
              does not guard against forgery."
         }
     }

@@ -9,7 +9,7 @@ use crate::lie::Vec3;
 use crate::machine::{JointKind, Machine};
 
 /// Size of the picture and the room around what is in it.
-const SIZE: (f64, f64) = (520.0, 400.0);
+const SIZE: (f64, f64) = (520.0, 380.0);
 const ROOM: f64 = 46.0;
 /// Arrows and circles of axes, as a part of the largest extent.
 const ARROW: f64 = 0.2;
@@ -17,7 +17,7 @@ const CIRCLE: f64 = 0.08;
 /// A machine whose frames all lie in one point is drawn this large, m.
 const ALONE: f64 = 0.2;
 /// Labels keep this far from each other.
-const APART: f64 = 17.0;
+const APART: f64 = 15.0;
 
 /// The section: picture and table of frames.
 pub(super) fn skeleton(machine: &Machine) -> Markup {
@@ -95,13 +95,14 @@ fn picture(machine: &Machine) -> Markup {
     let (x, y) = (ends(|p| p.0), ends(|p| p.1));
     let scale =
         ((SIZE.0 - 2.0 * ROOM) / (x.1 - x.0).max(1e-9)).min((SIZE.1 - 2.0 * ROOM) / (y.1 - y.0).max(1e-9));
+    let height = ((y.1 - y.0) * scale + 2.0 * ROOM).min(SIZE.1);
     let place = |p: (f64, f64)| {
-        (0.5 * SIZE.0 + (p.0 - 0.5 * (x.0 + x.1)) * scale, 0.5 * SIZE.1 + (p.1 - 0.5 * (y.0 + y.1)) * scale)
+        (0.5 * SIZE.0 + (p.0 - 0.5 * (x.0 + x.1)) * scale, 0.5 * height + (p.1 - 0.5 * (y.0 + y.1)) * scale)
     };
     let mut labels: Vec<(f64, f64, String)> = Vec::new();
     let mut label = |(x, y): (f64, f64), text: &str| {
         let (x, mut y) = (x + 6.0, y - 4.0);
-        while labels.iter().any(|(a, b, _)| (a - x).abs() < 2.5 * APART && (b - y).abs() < APART) {
+        while labels.iter().any(|(a, b, _)| (a - x).abs() < 1.8 * APART && (b - y).abs() < APART) {
             y += APART;
         }
         labels.push((x, y, text.to_string()));
@@ -123,7 +124,7 @@ fn picture(machine: &Machine) -> Markup {
     html! {
         figure {
             figcaption { strong { (machine.name()) " with all axes at zero" } (legend(&inks)) }
-            svg xmlns="http://www.w3.org/2000/svg" viewBox=(format!("0 0 {} {}", SIZE.0, SIZE.1)) role="img" {
+            svg xmlns="http://www.w3.org/2000/svg" viewBox=(format!("0 0 {} {height:.0}", SIZE.0)) role="img" {
                 title { "The machine with all axes at zero" }
                 desc { "Axes: " (axes.iter().map(word).collect::<Vec<_>>().join(", ")) ". The table below has the places of their frames." }
                 @for axis in &axes {
@@ -134,7 +135,7 @@ fn picture(machine: &Machine) -> Markup {
                     @else { path.line.m-none d=(joined(&axis.circle.iter().map(|p| place(*p)).collect::<Vec<_>>())) {} }
                 }
                 @for (branch, (ink, _)) in branches.iter().zip(inks) {
-                    path class=(format!("line {}", ink.class())) stroke-width="4" d=(way(branch)) {}
+                    path class=(format!("line way {}", ink.class())) d=(way(branch)) {}
                 }
                 @for (x, y) in &dots { circle.bar.m-curve cx=(at(*x)) cy=(at(*y)) r="3" {} }
                 @for (x, y, text) in &labels { text x=(at(*x)) y=(at(*y)) { (text) } }

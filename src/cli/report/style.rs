@@ -13,14 +13,14 @@ body{font-size:10pt;max-width:none;margin:0}figure,tr,.card,li{break-inside:avoi
 h1{font-size:1.5rem;margin:.2rem 0}h2{font-size:1.2rem;margin:2.4rem 0 .6rem;border-bottom:1px solid var(--line)}h3{font-size:1rem;margin:1.4rem 0 .4rem}\
 p,li{max-width:46rem}.verdict{font-size:1.25rem;line-height:1.4;font-weight:600;margin:.8rem 0}.note,figcaption{color:var(--soft);font-size:.88rem}\
 .card{background:var(--card);border:1px solid var(--line);border-radius:.4rem;padding:.2rem 1rem;margin:.8rem 0}ul.plain{list-style:none;padding:0;margin:.3rem 0}\
-ol.do li{margin:.35rem 0}code{font:.88em ui-monospace,monospace;overflow-wrap:anywhere}\
+.card h2{margin-top:.8rem}ol.do li{margin:.5rem 0}code{font:.88em ui-monospace,monospace;overflow-wrap:anywhere}\
 .figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(27rem,100%),1fr));gap:1rem}\
-.small{grid-template-columns:repeat(auto-fit,minmax(min(18rem,100%),1fr))}figure{margin:0;min-width:0}figure strong{color:var(--ink)}\
+.pair{display:grid;grid-template-columns:repeat(2,minmax(0,1fr));gap:1rem;max-width:44rem;margin:1rem 0}figure{margin:0;min-width:0}figure strong{color:var(--ink)}\
 svg{display:block;width:100%;max-width:44rem;height:auto;margin:.3rem 0}svg text{fill:var(--ink);font:13px system-ui,sans-serif}svg .t{fill:var(--soft)}\
 .legend span{display:inline-block;margin-right:1em;white-space:nowrap}.legend i{display:inline-block;width:.9em;height:.55em;margin-right:.35em;border-radius:2px}\
 .grid{stroke:var(--grid);fill:none}.zero,.frame{stroke:var(--none);fill:none}.band{fill:var(--band)}\
 .m-before{--c:var(--before)}.m-after{--c:var(--after)}.m-fwd{--c:var(--fwd)}.m-back{--c:var(--back)}.m-none{--c:var(--none)}.m-curve{--c:var(--curve)}.m-named{--c:var(--named)}.m-band{--c:var(--band)}\
-.dots{stroke:var(--c);stroke-width:3;stroke-linecap:round;fill:none}.line{stroke:var(--c);stroke-width:1.5;stroke-linejoin:round;fill:none}.bar{fill:var(--c)}.legend i{background:var(--c)}\
+.dots{stroke:var(--c);stroke-width:3;stroke-linecap:round;fill:none}.line{stroke:var(--c);stroke-width:1.5;stroke-linejoin:round;fill:none}.way{stroke-width:4}.bar{fill:var(--c)}.legend i{background:var(--c)}\
 table{border-collapse:collapse;font-size:.9rem;margin:.6rem 0;max-width:100%}th,td{text-align:left;vertical-align:top;padding:.3rem .7rem;border-bottom:1px solid var(--line)}\
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}th button{font:inherit;font-weight:600;color:inherit;background:none;border:0;padding:0;cursor:pointer;text-align:inherit}\
 th button:after{content:' \\2195';color:var(--soft);font-weight:400}th[aria-sort=ascending] button:after{content:' \\2191'}th[aria-sort=descending] button:after{content:' \\2193'}\
@@ -28,7 +28,7 @@ details{margin:.5rem 0;border:1px solid var(--line);border-radius:.4rem;padding:
 @media(max-width:52rem){body{margin:.6rem auto}table.fold,.fold tbody,.fold tr,.fold td{display:block;width:100%}.fold thead{display:none}\
 .fold tr{border-bottom:2px solid var(--line);padding:.3rem 0}.fold td{border:0;padding:.1rem 0;display:flex;justify-content:space-between;gap:1rem;text-align:right;white-space:normal}\
 .fold td:before{content:attr(data-h);color:var(--soft);text-align:left;flex:none;max-width:45%}.fold td:empty{display:none}}\
-@media(max-width:36rem){svg text{font-size:17px}}";
+@media(max-width:36rem){svg text{font-size:17px}.pair{grid-template-columns:minmax(0,1fr)}}";
 
 /// What is folded is printed. A click on a head sorts its table, once more the other way round.
 pub(super) const SCRIPT: &str = "\

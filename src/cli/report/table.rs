@@ -63,6 +63,11 @@ pub(super) fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
     numbers.into_iter().map(f64::abs).filter(|x| x.is_finite()).fold(0.0, f64::max)
 }
 
+/// A text whose parts in backquotes are code.
+pub(super) fn prose(text: &str) -> Markup {
+    html! { @for (k, part) in text.split('`').enumerate() { @if k % 2 == 1 { code { (part) } } @else { (part) } } }
+}
+
 /// A table with a head; columns without any text are left out.
 pub(super) fn table(heads: &[&str], rows: Vec<Vec<Cell>>) -> Markup {
     let is_used = |c: usize| rows.iter().any(|row| row.get(c).is_some_and(|cell| !cell.text.is_empty()));
