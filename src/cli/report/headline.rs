@@ -47,6 +47,10 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis) -> String {
     if diagnosis.unexplained.as_ref().is_some_and(|u| u.parts.iter().any(|part| part.modelled)) {
         names.push("what has no name".into());
     }
+    let is_bare = diagnosis.unexplained.is_none() && !more && is_noise(diagnosis);
+    if is_bare && parts.iter().all(|(nominal, last, ..)| *last > NOTHING * nominal) {
+        return format!("The machine is {} off, which is noise.", joined(&parts, |p| Some((p.0, p.3))));
+    }
     let mut text = sentence(&parts, diagnosis.geometry_numbers, &names);
     if let Some(unexplained) = &diagnosis.unexplained {
         text += &format!(" Something at {} is left that no name explains.", unexplained.at);
@@ -66,27 +70,33 @@ fn is_noise(diagnosis: &Diagnosis) -> bool {
             .all(|(rms, noise)| rms.as_ref().zip(*noise).is_none_or(|(rms, noise)| one(rms, noise)))
 }
 
-/// `The machine is 85 um off; 2.7 um after these 13 numbers, 0.50 um with play of a.`
-fn sentence(parts: &[(f64, f64, Option<f64>, bool)], numbers: u64, names: &[String]) -> String {
-    let joined = |of: &dyn Fn(&(f64, f64, Option<f64>, bool)) -> Option<String>| {
-        parts.iter().filter_map(of).collect::<Vec<_>>().join(" and ")
-    };
-    let mut text = format!("The machine is {} off", joined(&|p| Some(amount(p.0, p.3))));
+/// Root mean squares as declared, with geometry, with what was found, and whether they are angles.
+type Part = (f64, f64, Option<f64>, bool);
+
+/// One figure of each part.
+fn joined(parts: &[Part], of: impl Fn(&Part) -> Option<(f64, bool)>) -> String {
+    let figures = parts.iter().filter_map(of).map(|(si, angle)| amount(si, angle));
+    figures.collect::<Vec<_>>().join(" and ")
+}
+
+/// `The machine is 85 um off; 2.7 um after 13 numbers of its geometry, 0.50 um with play of a.`
+fn sentence(parts: &[Part], numbers: u64, names: &[String]) -> String {
+    let mut text = format!("The machine is {} off", joined(parts, |p| Some((p.0, p.3))));
     let idle = parts.iter().all(|(nominal, geometric, ..)| *geometric > NOTHING * nominal);
     if idle {
         text += "; geometry takes nothing of that away";
     } else {
         let numbers = count(numbers, "number", "numbers");
-        text += &format!("; {} after {numbers} of its geometry", joined(&|p| Some(amount(p.1, p.3))));
+        text += &format!("; {} after {numbers} of its geometry", joined(parts, |p| Some((p.1, p.3))));
     }
-    let last = joined(&|p| p.2.map(|last| amount(last, p.3)));
+    let last = joined(parts, |p| Some((p.2?, p.3)));
     if !last.is_empty() {
         let names = match names.split_last() {
             Some((last, [])) => last.clone(),
             Some((last, others)) => format!("{} and {last}", others.join(", ")),
             None => "all that was found".into(),
         };
-        text += &format!(", {last} with {names}");
+        text += &format!("{} {last} with {names}", if idle { ";" } else { "," });
     }
     text + "."
 }
