@@ -25,6 +25,8 @@ const SWEPT: f64 = 0.15;
 const PLANE: f64 = 0.02;
 /// Angles over which both senses are compared.
 const SECTORS: usize = 360;
+/// Of recordings with more samples every so manieth is looked at: what is held in memory does not grow with the file.
+const MOST_SAMPLES: u64 = 200_000;
 /// A turn by less is no motion, rad.
 const STILL: f64 = 1e-9;
 
@@ -44,7 +46,7 @@ pub enum SeenFrom {
 #[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OneSense {
-    /// Samples.
+    /// Samples that were looked at: of more than 200000 of a recording every so manieth.
     pub samples: u64,
     /// Circular deviation `G`: between two circles about the least-squares centre that enclose the path, m.
     pub g_m: f64,
@@ -105,6 +107,11 @@ impl CircularTest {
     }
 }
 
+/// Every so manieth of these samples is looked at, the first one too.
+pub(crate) fn stride(samples: u64) -> usize {
+    usize::try_from(samples.div_ceil(MOST_SAMPLES).max(1)).unwrap_or(usize::MAX)
+}
+
 /// The circular tests among recordings; angles are those of this machine.
 ///
 /// # Errors
@@ -124,11 +131,16 @@ fn circular_test(calibrated: &CalibratedMachine, recording: &Recording) -> Resul
     let (chain, state) = (chain(calibrated, header, &sensor)?, sensor_state(calibrated, header, &sensor)?);
     let is_known = matches!(header.nominal_length, NominalLength::Known(_));
     let commands = calibrated.machine().commands().len();
+    let (every, mut sample) = (stride(recording.scan()?.samples), 0);
     let mut bars: [Vec<Vec3<f64>>; 3] = Default::default();
     let (mut lengths, mut deviations) = (Vec::new(), Vec::new());
     for chunk in recording.chunks()? {
         let chunk = chunk?;
         for (q, value) in chunk.commands.chunks_exact(commands.max(1)).zip(&chunk.values) {
+            sample += 1;
+            if !(sample - 1usize).is_multiple_of(every) {
+                continue;
+            }
             let sweep = chain.sweep(q);
             let w_from_t = sweep.w_from_t();
             let bar_w = w_from_t.transform(state.tool_point_t) - state.workpiece_point_w;

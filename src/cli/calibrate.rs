@@ -198,7 +198,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
     if let Some(note) = &note {
         let _ = writeln!(text, "note: {note}");
     }
-    let circular = circular_tests(&calibrated, &recordings)?;
+    let circular = match args.report.is_some() || args.common.wants_json() {
+        true => circular_tests(&calibrated, &recordings)?,
+        false => Vec::new(),
+    };
     let page = match &args.report {
         None => None,
         Some(_) => {

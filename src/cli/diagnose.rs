@@ -93,6 +93,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     // Where a set-up has to be found first, the angles are those of the machine as declared.
     let circular = match &model {
+        _ if args.report.is_none() && !args.common.wants_json() => Vec::new(),
         Some(model) => circular_tests(model, &recordings)?,
         None => circular_tests(&declared(&machine, &recordings)?, &recordings)?,
     };

@@ -31,6 +31,7 @@ use crate::identify::{Fit, declared};
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::units::Rms;
+use table::prose;
 use track::{Stage, tracks};
 
 pub(crate) use actions::{Action, actions};
@@ -150,7 +151,7 @@ fn notes(notes: &[String]) -> Markup {
     html! {
         @if !notes.is_empty() {
             h2 { "Notes" }
-            ul { @for note in notes { li { (note) } } }
+            ul { @for note in notes { li { (prose(note)) } } }
         }
     }
 }
@@ -163,8 +164,10 @@ pub(crate) fn of_compensated(
     frame: &Frame,
 ) -> String {
     let machine = calibrated.machine();
+    // What could not be seen has a section.
+    let is_own = |line: &&str| !line.starts_with("  ") && !line.starts_with("not seen by ");
     let sections = [
-        html! { h2 { "What was done" } ul { @for line in told.lines() { li { (line) } } } },
+        html! { h2 { "What was done" } ul { @for line in told.lines().filter(is_own) { li { (prose(line)) } } } },
         corrections(report),
         enter::to_enter(calibrated),
         skeleton::skeleton(machine),

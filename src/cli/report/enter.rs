@@ -3,7 +3,7 @@
 
 use maud::{Markup, html};
 
-use super::table::{Cell, table, word, written};
+use super::table::{Cell, prose, table, word, written};
 use crate::calibration::CalibratedMachine;
 use crate::export::{ExportOptions, Exported, Format, export};
 
@@ -58,7 +58,7 @@ fn of_control(format: Format, name: &str, exported: &Exported) -> Markup {
                         li {
                             (left.what)
                             @if let Some(max) = left.max_m { ", up to " (crate::cli::output::length(max)) " at the tool" }
-                            "; " (left.because)
+                            "; " (prose(&left.because))
                         }
                     }
                 }
@@ -77,9 +77,13 @@ fn of_unit(exported: &Exported, unit: &str) -> Markup {
         "um" | "urad" => 1,
         _ => 7,
     };
-    let text = |value: f64, sign: bool| match sign {
-        true => format!("{value:+.decimals$}"),
-        false => format!("{value:.decimals$}"),
+    let text = |value: f64, sign: bool| {
+        // No sign before what is zero to so many decimals.
+        let value = if value.abs() < 0.5 * 10f64.powi(-(decimals as i32)) { 0.0 } else { value };
+        match sign && value != 0.0 {
+            true => format!("{value:+.decimals$}"),
+            false => format!("{value:.decimals$}"),
+        }
     };
     let rows: Vec<Vec<Cell>> = own
         .filter_map(|number| {

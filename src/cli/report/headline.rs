@@ -108,7 +108,7 @@ pub(crate) fn of_compensation(report: &compensate::Report) -> String {
     }
     let left = report.largest_left_m.value.max(report.largest_mid_line_m.value);
     format!(
-        "This program would be cut up to {} off; as it is written now, {} are left by the model.",
+        "This program would be cut up to {} off; as it is written now, {} is left, says the model.",
         length(report.largest_correction_m.value),
         length(left)
     )

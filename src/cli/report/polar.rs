@@ -32,7 +32,7 @@ pub(super) fn circular(tests: &[CircularTest], tracks: &[Track], last: &str) -> 
             @for test in tests.iter().take(MOST_TESTS) {
                 div.pair {
                     (picture(test, &shape(test), "as measured", most))
-                    @if let Some(left) = left(test, tracks) { (picture(test, &left, &format!("left {last}"), most)) }
+                    @if let Some(left) = left(test, tracks) { (picture(test, &left, &format!("left over: {last}"), most)) }
                 }
             }
             @if tests.len() > MOST_TESTS { p.note { "The first " (MOST_TESTS) " of " (tests.len()) " are drawn." } }

@@ -1,6 +1,7 @@
 //! Residuals of every recording under each model, sample by sample, beside time and commands: what the pictures are drawn from.
 
 use crate::calibration::CalibratedMachine;
+use crate::circular::stride;
 use crate::error::Result;
 use crate::machine::{JointKind, Machine};
 use crate::motion::{FirstDirections, Tracker};
@@ -62,9 +63,15 @@ pub(super) fn tracks(
     for recording in recordings {
         let mut all: Vec<Vec<f64>> = Vec::new();
         let (mut rms, mut samples) = (Vec::new(), 0);
+        let every = stride(recording.scan()?.samples);
         for stage in stages {
-            let mut flat = Vec::new();
-            let told = residuals(stage.calibrated, recording, |sample| flat.extend_from_slice(sample))?;
+            let (mut flat, mut count) = (Vec::new(), 0usize);
+            let told = residuals(stage.calibrated, recording, |sample| {
+                if count.is_multiple_of(every) {
+                    flat.extend_from_slice(sample);
+                }
+                count += 1;
+            })?;
             rms.push(told.rms);
             samples = told.samples;
             all.push(flat);
@@ -83,7 +90,8 @@ pub(super) fn tracks(
 
 fn of_recording(machine: &Machine, recording: &Recording, stages: &[Vec<f64>]) -> Result<Vec<Track>> {
     let count = machine.commands().len();
-    let ranges = recording.scan()?.commands;
+    let summary = recording.scan()?;
+    let (ranges, every, mut behind) = (summary.commands, stride(summary.samples), 0usize);
     let bands: Vec<f64> = ranges.iter().map(|(from, to)| DEAD_BAND * (to - from).abs()).collect();
     let mut first = FirstDirections::new(bands.clone());
     for chunk in recording.chunks()? {
@@ -97,14 +105,17 @@ fn of_recording(machine: &Machine, recording: &Recording, stages: &[Vec<f64>]) -
     let mut directions = vec![Vec::new(); count];
     for chunk in recording.chunks()? {
         let chunk = chunk?;
-        if let (Some(all), Some(own)) = (&mut time, &chunk.time) {
-            all.extend_from_slice(own);
-        }
         let motion = tracker.follow(&chunk);
-        for k in 0..chunk.len * count {
-            commands[k % count].push(chunk.commands[k]);
-            directions[k % count].push(motion.directions[k]);
+        for k in (0..chunk.len).filter(|k| (behind + k).is_multiple_of(every)) {
+            if let (Some(all), Some(own)) = (&mut time, &chunk.time) {
+                all.push(own[k]);
+            }
+            for c in 0..count {
+                commands[c].push(chunk.commands[k * count + c]);
+                directions[c].push(motion.directions[k * count + c]);
+            }
         }
+        behind += chunk.len;
     }
     let settled = is_settled(&commands, &ranges);
     let (width, parts): (usize, Vec<(bool, std::ops::Range<usize>)>) = match recording.header().measurement {
