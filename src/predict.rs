@@ -100,11 +100,14 @@ pub fn residuals(
     predicted(calibrated, recording, None, Some(&mut each))
 }
 
+/// Is given the residuals of a sample.
+type Each<'a> = &'a mut dyn FnMut(&[f64]);
+
 fn predicted(
     calibrated: &CalibratedMachine,
     recording: &Recording,
     mut out: Option<&mut dyn Write>,
-    mut each: Option<&mut dyn FnMut(&[f64])>,
+    mut each: Option<Each>,
 ) -> Result<Prediction> {
     let machine = calibrated.machine();
     let header = recording.header();

@@ -3,7 +3,7 @@
 use super::text::amount;
 use crate::cli::output::{count, length};
 use crate::compensate;
-use crate::diagnose::Diagnosis;
+use crate::diagnose::{Diagnosis, Finding};
 use crate::identify::Fit;
 
 /// What is left within this many times the noise is noise.
@@ -38,11 +38,16 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis) -> String {
     }
     let mut names: Vec<String> = Vec::new();
     for finding in &diagnosis.findings {
-        let effect = finding.effect.replace('_', " ");
-        names.push(match finding.at.as_str() {
-            "measurement" => format!("{effect} of the measurement"),
-            at => format!("{effect} of {at}"),
-        });
+        let is_like = |f: &&Finding| (&f.effect, &f.at) == (&finding.effect, &finding.at);
+        // Forms are told where the name alone would be there twice.
+        let is_alone = diagnosis.findings.iter().filter(is_like).count() == 1;
+        let form = finding.form.as_ref().filter(|_| !is_alone);
+        let effect = form.unwrap_or(&finding.effect).replace('_', " ");
+        let at = if finding.at == "measurement" { "the measurement" } else { &finding.at };
+        let name = format!("{effect} of {at}");
+        if !names.contains(&name) {
+            names.push(name);
+        }
     }
     if diagnosis.unexplained.as_ref().is_some_and(|u| u.parts.iter().any(|part| part.modelled)) {
         names.push("what has no name".into());

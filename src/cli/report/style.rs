@@ -22,7 +22,7 @@ svg{display:block;width:100%;max-width:44rem;height:auto;margin:.3rem 0}svg text
 .m-before{--c:var(--before)}.m-after{--c:var(--after)}.m-fwd{--c:var(--fwd)}.m-back{--c:var(--back)}.m-none{--c:var(--none)}.m-curve{--c:var(--curve)}.m-named{--c:var(--named)}.m-band{--c:var(--band)}\
 .dots{stroke:var(--c);stroke-width:3;stroke-linecap:round;fill:none}.line{stroke:var(--c);stroke-width:1.5;stroke-linejoin:round;fill:none}.way{stroke-width:4}.bar{fill:var(--c)}.legend i{background:var(--c)}\
 table{border-collapse:collapse;font-size:.9rem;margin:.6rem 0;max-width:100%}th,td{text-align:left;vertical-align:top;padding:.3rem .7rem;border-bottom:1px solid var(--line)}\
-td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}th button{font:inherit;font-weight:600;color:inherit;background:none;border:0;padding:0;cursor:pointer;text-align:inherit}\
+td.n,th.n{text-align:right;font-variant-numeric:tabular-nums}td.n{white-space:nowrap}.wide{overflow-x:auto}th button{font:inherit;font-weight:600;color:inherit;background:none;border:0;padding:0;cursor:pointer;text-align:inherit}\
 th button:after{content:' \\2195';color:var(--soft);font-weight:400}th[aria-sort=ascending] button:after{content:' \\2191'}th[aria-sort=descending] button:after{content:' \\2193'}\
 details{margin:.5rem 0;border:1px solid var(--line);border-radius:.4rem;padding:.3rem .8rem}summary{cursor:pointer;font-weight:600}\
 @media(max-width:52rem){body{margin:.6rem auto}table.fold,.fold tbody,.fold tr,.fold td{display:block;width:100%}.fold thead{display:none}\

@@ -20,7 +20,7 @@ pub(super) fn word(text: impl Into<String>) -> Cell {
 pub(super) fn number(si: f64, unit: Shown) -> Cell {
     let value = si * unit.per_si;
     let text = match value.is_finite() {
-        true => format!("{value:.*}", decimals(value, 3)),
+        true => format!("{value:.*}", decimals(value, 3).min(5)),
         false => "open".into(),
     };
     Cell { text: no_minus_before_zero(text), value: Some(si) }
@@ -76,7 +76,7 @@ pub(super) fn table(heads: &[&str], rows: Vec<Vec<Cell>>) -> Markup {
     let numeric: Vec<bool> = (0..heads.len()).map(is_number).collect();
     html! {
         @if !rows.is_empty() {
-            table.fold {
+            div.wide { table.fold {
                 thead { tr {
                     @for c in &columns {
                         th scope="col" class=[numeric[*c].then_some("n")] { button type="button" { (heads[*c]) } }
@@ -92,7 +92,7 @@ pub(super) fn table(heads: &[&str], rows: Vec<Vec<Cell>>) -> Markup {
                         }
                     } }
                 }
-            }
+            } }
         }
     }
 }
