@@ -18,7 +18,7 @@ use super::files::Output;
 use super::output::{
     Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, table, write_whole,
 };
-use super::report::{self, Action, Frame, Measured, Source, of_measured, write_page};
+use super::report::{self, Frame, Measured, Source, of_measured, write_page};
 use super::verdict;
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -382,16 +382,7 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         fit.combinations.len() - seen
     );
     text.push_str(&super::location::render_location_errors(&fit.location_errors));
-    let list = report::actions(None, &fit.location_errors);
-    if !list.is_empty() {
-        text.push_str("\nwhat to do\n");
-    }
-    for Action { what, remedy } in list {
-        for what in what {
-            let _ = writeln!(text, "  {what}");
-        }
-        let _ = writeln!(text, "    do: {remedy}");
-    }
+    text.push_str(&report::geometry_to_do(&fit.location_errors));
     for suspect in fit.suspects.iter().take(5) {
         let _ = writeln!(
             text,

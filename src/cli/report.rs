@@ -34,10 +34,9 @@ use crate::units::Rms;
 use table::prose;
 use track::{Stage, tracks};
 
-pub(crate) use actions::{Action, actions};
 pub(crate) use headline::{of_diagnosis, of_fit};
 pub(crate) use provenance::Source;
-pub(crate) use terminal::render;
+pub(crate) use terminal::{geometry_to_do, render};
 
 /// What all pages have.
 pub(crate) struct Frame<'a> {
@@ -83,7 +82,7 @@ pub(crate) fn of_measured(measured: &Measured, frame: &Frame) -> crate::error::R
     let still = still(machine, recordings)?;
     let still: Vec<&str> = still.iter().map(String::as_str).collect();
     let mut sections = vec![
-        actions::to_do(&actions(found, location)),
+        actions::to_do(&actions::actions(found, location)),
         before_after::before_after(&figures, &names, &totals(fit, found)),
         polar::circular(circular, &tracks, names.last().copied().unwrap_or_default()),
     ];

@@ -11,13 +11,13 @@ use crate::location::LocationErrors;
 const DOUBTED: f64 = 0.3;
 
 /// What is the case, and what to do about all of it.
-pub(crate) struct Action {
+pub(super) struct Action {
     pub what: Vec<String>,
     pub remedy: String,
 }
 
 /// What to do about a finding.
-pub(crate) fn of_finding(finding: &Finding) -> String {
+pub(super) fn of_finding(finding: &Finding) -> String {
     let doubt: f64 = finding.confusable_with.iter().map(|other| other.probability).sum();
     let first = tests(finding).into_iter().next().filter(|_| doubt > DOUBTED);
     let remedy = match finding.remedy.as_str() {
@@ -31,7 +31,7 @@ pub(crate) fn of_finding(finding: &Finding) -> String {
 }
 
 /// Everything that can be done, the most important first; what calls for the same stands together.
-pub(crate) fn actions(diagnosis: Option<&Diagnosis>, location: &LocationErrors) -> Vec<Action> {
+pub(super) fn actions(diagnosis: Option<&Diagnosis>, location: &LocationErrors) -> Vec<Action> {
     let mut list: Vec<Action> = Vec::new();
     let mut add = |what: String, remedy: String| match list.iter_mut().find(|a| a.remedy == remedy) {
         Some(action) => action.what.push(what),

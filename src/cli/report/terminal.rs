@@ -2,11 +2,12 @@
 
 use std::fmt::Write;
 
-use super::actions::of_finding;
+use super::actions::{Action, actions, of_finding};
 use super::headline::of_diagnosis;
 use super::text::{CALM, about, about_unexplained, beside, figures};
 use crate::cli::output::count;
 use crate::diagnose::Diagnosis;
+use crate::location::LocationErrors;
 
 /// Everything.
 pub(crate) fn render(diagnosis: &Diagnosis) -> String {
@@ -29,6 +30,7 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
     } else if diagnosis.findings.is_empty() {
         let _ = writeln!(text, "\n{CALM}");
     }
+    text.push_str(&geometry_to_do(&diagnosis.location_errors));
     for timeless in diagnosis.not_tried.iter().filter(|n| n.for_want_of_time) {
         let names = timeless.effects.join(", ");
         let _ = writeln!(text, "\nnot tried, since a recording has no column t: {names}");
@@ -58,6 +60,19 @@ fn head(diagnosis: &Diagnosis) -> String {
     );
     for line in figures(diagnosis) {
         let _ = writeln!(text, "{line}");
+    }
+    text
+}
+
+/// What is clearly out of place, and what to do about it.
+pub(crate) fn geometry_to_do(location: &LocationErrors) -> String {
+    let mut text = String::new();
+    for Action { what, remedy } in actions(None, location) {
+        text.push_str(if text.is_empty() { "\nwhat to do about the geometry\n" } else { "" });
+        for what in what {
+            let _ = writeln!(text, "  {what}");
+        }
+        let _ = writeln!(text, "    do: {remedy}");
     }
     text
 }
