@@ -169,7 +169,8 @@ fn redacted(text: &str) -> String {
     let word = |word: &str| {
         if word.contains('.') && !word.ends_with(".csv") { hide(word) } else { word.to_string() }
     };
-    let line = |line: &str| match line.contains('±') && line.contains('%') {
+    let is_measured = |line: &str| line.contains("um/m") || line.contains(" um towards ");
+    let line = |line: &str| match line.contains('±') && line.contains('%') || is_measured(line) {
         true => hide(line),
         false => line.split(' ').map(word).collect::<Vec<_>>().join(" "),
     };
