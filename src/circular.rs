@@ -5,6 +5,8 @@
 //! `F` from the nominal circle as the instrument is centred; circular deviation `G`, circular hysteresis `H` and mean bi-directional radial
 //! deviation `D` about the least-squares centre. On a cone they are formed in the same way, along the bar.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +27,8 @@ const SWEPT: f64 = 0.15;
 const PLANE: f64 = 0.02;
 /// Angles over which both senses are compared.
 const SECTORS: usize = 360;
+/// Neighbours farther apart than this have nothing between them, rad.
+const FAR_APART: f64 = 0.1;
 /// Of recordings with more samples every so manieth is looked at: what is held in memory does not grow with the file.
 const MOST_SAMPLES: u64 = 200_000;
 /// A turn by less is no motion, rad.
@@ -222,8 +226,7 @@ fn turned(directions: &[Vec3<f64>], axis: Vec3<f64>, deviations: &[f64]) -> Vec<
         let (angle, sense) = match path.last() {
             None => (bare, 0),
             Some(last) => {
-                let turn = (bare - last.angle + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
-                    - std::f64::consts::PI;
+                let turn = (bare - last.angle + std::f64::consts::PI).rem_euclid(TAU) - std::f64::consts::PI;
                 let sense = if turn.abs() > STILL { turn.signum() as i8 } else { last.sense };
                 (last.angle + turn, sense)
             }
@@ -285,18 +288,29 @@ fn with_figures(mut test: CircularTest, is_known: bool) -> CircularTest {
     test
 }
 
-/// Largest difference of the two senses at one angle: means over sectors that both have crossed.
+/// Largest difference of the two senses at one angle: of every sample of the one to the other between its neighbours there, means over
+/// sectors.
 fn hysteresis(ccw: &[Turned], cw: &[Turned], centre: [f64; 3]) -> Option<f64> {
-    let means = |path: &[Turned]| -> Vec<Option<f64>> {
-        let mut sums = vec![(0.0, 0u32); SECTORS];
-        for turned in path {
-            let part = turned.angle.rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU;
-            let slot = &mut sums[((part * SECTORS as f64) as usize).min(SECTORS - 1)];
-            *slot = (slot.0 + about(turned, centre), slot.1 + 1);
+    let place = |t: &Turned| (t.angle.rem_euclid(TAU), about(t, centre));
+    let mut other: Vec<(f64, f64)> = cw.iter().map(place).collect();
+    other.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let first = *other.first()?;
+    let last = *other.last()?;
+    // Round the circle, so that every angle has a neighbour on either side.
+    other.insert(0, (last.0 - TAU, last.1));
+    other.push((first.0 + TAU, first.1));
+    let mut sums = vec![(0.0, 0u32); SECTORS];
+    for (angle, own) in ccw.iter().map(place) {
+        let after = other.partition_point(|(a, _)| *a < angle).clamp(1, other.len() - 1);
+        let ((from, start), (to, end)) = (other[after - 1], other[after]);
+        if to - from > FAR_APART {
+            continue;
         }
-        sums.into_iter().map(|(sum, n)| (n > 0).then(|| sum / f64::from(n))).collect()
-    };
-    let gaps = means(ccw).into_iter().zip(means(cw)).filter_map(|(a, b)| Some((a? - b?).abs()));
+        let part = if to > from { (angle - from) / (to - from) } else { 0.5 };
+        let sector = ((angle / TAU * SECTORS as f64) as usize).min(SECTORS - 1);
+        sums[sector] = (sums[sector].0 + own - start - (end - start) * part, sums[sector].1 + 1);
+    }
+    let gaps = sums.into_iter().filter(|(_, n)| *n > 0).map(|(sum, n)| (sum / f64::from(n)).abs());
     gaps.max_by(f64::total_cmp)
 }
 
