@@ -19,6 +19,7 @@ mod output;
 mod part;
 mod predict;
 mod program;
+mod report;
 mod simulate;
 mod verdict;
 mod verify;

@@ -110,6 +110,8 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 
 pub use fault::CompensateFault;
+#[cfg(feature = "cli")]
+pub(crate) use mark::Fingerprint;
 pub use model::Model;
 pub use options::{CompensateOptions, IntegerUnit, UnknownAxes};
 pub use report::{

@@ -51,6 +51,23 @@ pub struct Demo {
     pub diagnosed: CalibratedMachine,
 }
 
+impl Demo {
+    /// The recordings, read.
+    ///
+    /// # Errors
+    /// None that a user could cause.
+    pub fn read(&self) -> Result<Vec<Recording>> {
+        read(&self.recordings, self.calibrated.machine())
+    }
+}
+
+fn read(texts: &[String], machine: &Machine) -> Result<Vec<Recording>> {
+    let one = |(text, degrees): (&String, u8)| {
+        Recording::from_bytes(&format!("bk4_{degrees}deg.csv"), text.clone().into_bytes(), machine)
+    };
+    texts.iter().zip(INCLINATIONS).map(one).collect()
+}
+
 /// Runs it; the same seed gives the same figures. `progress` is told what is being done.
 ///
 /// # Errors
@@ -100,10 +117,7 @@ pub fn demo(seed: u64, progress: &dyn Fn(&str)) -> Result<Demo> {
         session.record(&mut text, |_| ())?;
         texts.push(String::from_utf8_lossy(&text).into_owned());
     }
-    let read = (texts.iter().zip(INCLINATIONS)).map(|(text, degrees)| {
-        Recording::from_bytes(&format!("bk4_{degrees}deg.csv"), text.clone().into_bytes(), &machine)
-    });
-    let read = read.collect::<Result<Vec<_>>>()?;
+    let read = read(&texts, &machine)?;
     progress("calibrating");
     let (calibrated, fit) = calibrate(&machine, &read, CalibrateOptions::default())?;
     let request = DiagnoseOptions::default();

@@ -265,6 +265,25 @@ fn attempt_setup(
     Ok((fitted, hangs.then(|| upright::frames(unknowns))))
 }
 
+/// The machine as declared, with the frames, tool points, zeros and lengths that the recordings declare unknown as they are found on it:
+/// what `as declared` refers to in a [`Fit`].
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn declared(machine: &Machine, recordings: &[Recording]) -> Result<CalibratedMachine> {
+    let varying = Varying::default();
+    let sources = Sources::new(recordings, machine, &varying, &[], &|_| {})?;
+    enough_to_start(machine, &sources)?;
+    enough_for_setups(&sources)?;
+    let layout = Layout::new(machine, &sources, &varying, 1.0);
+    let mut problem = Problem::new(machine, &sources, &layout, &varying, is_of_setup);
+    let start = Unknowns::nominal(machine, &sources, &varying);
+    let Placed { solution, .. } = place(&mut problem, start)?;
+    let mut result = CalibratedMachine::nominal(machine.clone());
+    put_setups(&mut result, &sources, &solution.unknowns);
+    Ok(result)
+}
+
 /// The machine with all that was found.
 fn calibrated(machine: &Machine, sources: &Sources, found: &Found) -> CalibratedMachine {
     let unknowns = &found.solution.unknowns;

@@ -44,6 +44,7 @@
 //! | [`mistakes`] | recordings and machines that do not belong together, and why |
 //! | [`describe`](mod@describe) | topology, equation in symbols, identifiability |
 //! | [`predict`](mod@predict) | what a calibrated machine says an instrument would read |
+//! | [`circular`] | ballbar recordings along circles and cones, ISO 230-4 |
 //! | `rivals` | identification by other schemes, and a filter, judged side by side |
 //! | [`diagnose`](mod@diagnose) | where model and recordings differ, and what physics was left out |
 //! | [`inverse`] | commands that bring the tool to a pose, for any chain |
@@ -112,6 +113,7 @@ mod check;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod check;
+pub mod circular;
 #[cfg(feature = "cli")]
 mod cli;
 pub mod compensate;

@@ -21,6 +21,8 @@
 //! # Ok::<(), kincal::Error>(())
 //! ```
 
+mod words;
+
 use num_dual::Dual64;
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +31,7 @@ use crate::lie::{Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::scalar::Scalar;
 use crate::units::unbounded;
+pub use words::Said;
 
 /// At least this share of a location error must come from the data for it to be called identified: its standard error is then below a
 /// third (√0.1) of what the tolerances alone allow.

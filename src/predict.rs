@@ -83,7 +83,31 @@ pub struct Beyond {
 pub fn predict(
     calibrated: &CalibratedMachine,
     recording: &Recording,
+    out: Option<&mut dyn Write>,
+) -> Result<Prediction> {
+    predicted(calibrated, recording, out, None)
+}
+
+/// The residuals (measured minus model, m or rad) of every sample in its turn, one for each reading.
+///
+/// # Errors
+/// As [`predict`].
+pub fn residuals(
+    calibrated: &CalibratedMachine,
+    recording: &Recording,
+    mut each: impl FnMut(&[f64]),
+) -> Result<Prediction> {
+    predicted(calibrated, recording, None, Some(&mut each))
+}
+
+/// Is given the residuals of a sample.
+type Each<'a> = &'a mut dyn FnMut(&[f64]);
+
+fn predicted(
+    calibrated: &CalibratedMachine,
+    recording: &Recording,
     mut out: Option<&mut dyn Write>,
+    mut each: Option<Each>,
 ) -> Result<Prediction> {
     let machine = calibrated.machine();
     let header = recording.header();
@@ -130,8 +154,11 @@ pub fn predict(
                 (next_group(&mut rows, Some(path)), judged)
             }
         };
-        for (own, text) in judged {
+        for Judged { sums: own, text, residuals } in judged {
             sums.add(&own);
+            if let Some(each) = &mut each {
+                residuals.chunks_exact(sensor.reading_count()).for_each(&mut **each);
+            }
             if let Some(out) = &mut out {
                 out.write_all(text.as_bytes()).map_err(failed)?;
             }
@@ -206,6 +233,13 @@ impl Sums {
     }
 }
 
+/// What is told of a block of rows: its sums, its rows as they are to be written, its residuals.
+struct Judged {
+    sums: Sums,
+    text: String,
+    residuals: Vec<f64>,
+}
+
 /// Compares blocks of rows with the model.
 struct Judge<'a> {
     calibrated: &'a CalibratedMachine,
@@ -214,8 +248,7 @@ struct Judge<'a> {
 }
 
 impl Judge<'_> {
-    /// The sums of a block, and its rows as they are to be written.
-    fn block(&self, (mut block, on_path): Item) -> (Sums, String) {
+    fn block(&self, (mut block, on_path): Item) -> Judged {
         let Judge { calibrated, evaluator, table } = self;
         let commands = evaluator.machine.commands().len();
         let mut sums = Sums::none(commands, evaluator.piece_count());
@@ -259,7 +292,7 @@ impl Judge<'_> {
                 }
             }
         }
-        (sums, text)
+        Judged { sums, text, residuals }
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
+use crate::circular::{CircularTest, circular_tests};
 use crate::identify::{CalibrateOptions, ErrorModel, Figures, Fit, Loss, Solver, calibrate_model};
 use crate::machine::JointKind;
 use crate::machine::Machine;
@@ -17,6 +18,7 @@ use super::files::Output;
 use super::output::{
     Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, table, write_whole,
 };
+use super::report::{self, Frame, Measured, Source, of_measured, write_page};
 use super::verdict;
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -52,6 +54,9 @@ pub(crate) struct Args {
     /// Where to write the calibrated machine
     #[arg(short, long, value_name = "CALIBRATED.ron")]
     output: Option<Output>,
+    /// Where to write the report with its pictures: one HTML file
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<Output>,
     /// How to walk to the optimum
     #[arg(long, value_enum, default_value = "lm")]
     solver: SolverWord,
@@ -168,6 +173,16 @@ impl Args {
     }
 }
 
+/// What is told in JSON.
+#[derive(serde::Serialize)]
+struct Told<'a> {
+    verdict: String,
+    #[serde(flatten)]
+    fit: &'a Fit,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    circular_tests: &'a [CircularTest],
+}
+
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
@@ -179,17 +194,38 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let notes = verdict::of_recordings(&machine, &recordings, args.force, &|text| progress.say(text))?;
     fit.warnings.extend(notes);
     let note = verdict::of_fit(&machine, &recordings, &fit, args.force, &|text| progress.say(text))?;
-    drop(progress);
     let mut text = render(&fit, args.all);
-    if let Some(note) = note {
+    if let Some(note) = &note {
         let _ = writeln!(text, "note: {note}");
     }
+    let circular = match args.report.is_some() || args.common.wants_json() {
+        true => circular_tests(&calibrated, &recordings)?,
+        false => Vec::new(),
+    };
+    let page = match &args.report {
+        None => None,
+        Some(_) => {
+            progress.say("drawing the report");
+            let mut sources = vec![Source::of("machine", &args.machine)];
+            sources.extend(args.recordings.iter().map(|path| Source::of("recording", path)));
+            let notes = fit.warnings.iter().cloned().chain(note).collect();
+            let geometry = (&calibrated, &fit);
+            let (machine, recordings, circular) = (&machine, &recordings[..], &circular[..]);
+            let measured = Measured { machine, recordings, geometry, diagnosis: None, circular };
+            Some(of_measured(&measured, &Frame { command: "kincal calibrate", sources, notes })?)
+        }
+    };
+    drop(progress);
     if let Some(path) = &args.output {
         write_machine(path, &calibrated)?;
         let _ = writeln!(text, "\nwritten to {}", path.display());
     }
+    if let (Some(path), Some(page)) = (&args.report, page) {
+        write_page(path, &page)?;
+        let _ = writeln!(text, "\nreport written to {}", path.display());
+    }
     args.common.say(&text)?;
-    args.common.write_json(&fit)
+    args.common.write_json(&Told { verdict: report::of_fit(&fit), fit: &fit, circular_tests: &circular })
 }
 
 fn command(machine: &Machine, name: &str) -> Outcome<usize> {
@@ -290,7 +326,8 @@ const MOSTLY: f64 = 0.7;
 /// The result as people read it.
 pub(crate) fn render(fit: &Fit, all: bool) -> String {
     let recordings = count(fit.recordings.len() as u64, "recording", "recordings");
-    let mut text = format!("{}: {} in {recordings}", fit.machine, count(fit.samples, "sample", "samples"));
+    let mut text = format!("{}\n\n", report::of_fit(fit));
+    let _ = write!(text, "{}: {} in {recordings}", fit.machine, count(fit.samples, "sample", "samples"));
     if fit.dropped > 0 {
         let _ = write!(text, ", {} left out as drop-outs", count(fit.dropped, "row", "rows"));
     }
@@ -345,6 +382,7 @@ pub(crate) fn render(fit: &Fit, all: bool) -> String {
         fit.combinations.len() - seen
     );
     text.push_str(&super::location::render_location_errors(&fit.location_errors));
+    text.push_str(&report::geometry_to_do(&fit.location_errors));
     for suspect in fit.suspects.iter().take(5) {
         let _ = writeln!(
             text,

@@ -14,6 +14,7 @@ use super::Common;
 use super::files::Output;
 use super::output::{Failure, Outcome, angle, count, length, open_machine, write_checked};
 use super::program::{DialectWord, IntegerWord, at, departures, dialect_of, integer_unit_of, tolerance};
+use super::report::{Frame, Source, of_compensated, write_page};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -26,6 +27,9 @@ pub(crate) struct Args {
     /// Where to write the corrected program
     #[arg(short, long, value_name = "OUT.nc")]
     output: Option<Output>,
+    /// Where to write the report: one HTML file
+    #[arg(long, value_name = "OUT.html")]
+    report: Option<Output>,
     /// Tools and work offsets, docs/compensate.md
     #[arg(long, value_name = "SETUP.ron")]
     setup: Option<PathBuf>,
@@ -149,6 +153,15 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     if let Some(path) = &args.output {
         let _ = writeln!(text, "written to {}", path.display());
+    }
+    if let Some(path) = &args.report {
+        let mut sources =
+            vec![Source::of("calibrated machine", &args.machine), Source::of("program", &args.program)];
+        sources.extend(args.setup.iter().map(|path| Source::of("set-up", path)));
+        sources.extend(args.m_codes.iter().map(|path| Source::of("M codes", path)));
+        let frame = Frame { command: "kincal compensate", sources, notes: Vec::new() };
+        write_page(path, &of_compensated(&calibrated, &report, &text, &frame))?;
+        let _ = writeln!(text, "report written to {}", path.display());
     }
     args.common.say(&text)?;
     args.common.write_json(&Told { report, verification: verified })

@@ -3,11 +3,14 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::demo::demo;
+use crate::circular::circular_tests;
+use crate::demo::{REFERENCE, demo};
 
+use super::diagnose::Told;
 use super::files::Output;
 use super::output::{Outcome, length};
-use super::{Common, calibrate, diagnose};
+use super::report::{self, Frame, Measured, Source, of_measured, write_page};
+use super::{Common, calibrate};
 
 /// Where the report goes unless told otherwise.
 const REPORT: &str = "kincal_demo.html";
@@ -25,11 +28,27 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let report: &Path = &args.report;
+    let page_path: &Path = &args.report;
     let progress = args.common.progress();
     let demo = demo(args.seed, &|text| progress.say(text));
-    drop(progress);
     let demo = demo?;
+    progress.say("drawing the report");
+    let machine = demo.calibrated.machine();
+    let recordings = demo.read()?;
+    let mut sources = vec![Source::of_text("machine", "ac_table_tilting.ron", REFERENCE)];
+    let texts = recordings.iter().zip(&demo.recordings);
+    sources.extend(texts.map(|(recording, text)| Source::of_text("recording", recording.name(), text)));
+    let circular = circular_tests(&demo.diagnosed, &recordings)?;
+    let measured = Measured {
+        machine,
+        recordings: &recordings,
+        geometry: (&demo.calibrated, &demo.fit),
+        diagnosis: Some((&demo.diagnosis, Some(&demo.diagnosed))),
+        circular: &circular,
+    };
+    let frame = Frame { command: "kincal demo", sources, notes: Vec::new() };
+    let page = of_measured(&measured, &frame)?;
+    drop(progress);
     let mut text = format!(
         "The AC table-tilting reference machine, with random errors of its declared tolerances in every frame, is measured by a \
          simulated ballbar\non two cones in both senses of travel (ISO 10791-6 BK4, inclined by 10 and 30 deg; bar 100 mm, noise \
@@ -46,9 +65,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
             length(rms.geometric)
         );
     }
-    text.push_str(&diagnose::render(&demo.diagnosis));
-    diagnose::write_report(report, &demo.diagnosis)?;
-    let _ = writeln!(text, "\nreport with pictures written to {}", report.display());
+    text.push_str(&report::render(&demo.diagnosis));
+    write_page(page_path, &page)?;
+    let _ = writeln!(text, "\nreport with pictures written to {}", page_path.display());
     args.common.say(&text)?;
-    args.common.write_json(&demo.diagnosis)
+    let verdict = report::of_diagnosis(&demo.diagnosis);
+    args.common.write_json(&Told { verdict, diagnosis: &demo.diagnosis, circular_tests: &circular })
 }

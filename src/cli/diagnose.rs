@@ -1,21 +1,20 @@
 //! `kincal diagnose`
 
-mod page;
-mod plot;
-mod text;
-
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use crate::circular::{CircularTest, circular_tests};
 use crate::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use crate::effects::Library;
+use crate::feature::as_seen_in;
+use crate::identify::{calibrate, declared};
 use crate::machine::Machine;
 
 use super::Common;
 use super::files::Output;
 use super::output::{Outcome, open_machine, open_recordings, write_whole};
+use super::report::{Frame, Measured, Source, of_diagnosis, of_measured, render, write_page};
 use super::verdict;
-pub(crate) use text::render;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -44,6 +43,16 @@ pub(crate) struct Args {
     common: Common,
 }
 
+/// What is told in JSON.
+#[derive(serde::Serialize)]
+pub(crate) struct Told<'a> {
+    pub verdict: String,
+    #[serde(flatten)]
+    pub diagnosis: &'a Diagnosis,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    pub circular_tests: &'a [CircularTest],
+}
+
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
@@ -63,7 +72,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let note = verdict::beforehand(&machine, &recordings, args.force, &|text| progress.say(text))?;
     let found = diagnose(&machine, &recordings, &library, &request, &|text| progress.say(text)).and_then(
         |mut found| {
-            let wanted = args.output.is_some() || !found.findings.is_empty();
+            let wanted = args.output.is_some() || found.has_more_than_geometry();
             let model = match wanted {
                 true => {
                     Some(found.model(&machine, &recordings, request.options, &|text| progress.say(text))?)
@@ -73,18 +82,42 @@ pub(crate) fn run(args: &Args) -> Outcome {
             Ok((found, model))
         },
     );
-    drop(progress);
     let (diagnosis, model) = found?;
+    let mut notes: Vec<String> = note.into_iter().collect();
+    for recording in &recordings {
+        notes.extend(recording.warnings().iter().map(|w| format!("{}: {w}", recording.name())));
+    }
     let mut text = render(&diagnosis);
-    if let Some(note) = note {
+    for note in &notes {
         let _ = writeln!(text, "note: {note}");
     }
-    for recording in &recordings {
-        for warning in recording.warnings() {
-            let _ = writeln!(text, "note: {}: {warning}", recording.name());
+    // Where a set-up has to be found first, the angles are those of the machine as declared.
+    let circular = match &model {
+        _ if args.report.is_none() && !args.common.wants_json() => Vec::new(),
+        Some(model) => circular_tests(model, &recordings)?,
+        None => circular_tests(&declared(&machine, &recordings)?, &recordings)?,
+    };
+    let page = match &args.report {
+        None => None,
+        Some(_) => {
+            progress.say("drawing the report");
+            let seen = as_seen_in(&machine, &recordings);
+            let (geometry, fit) = calibrate(&seen, &recordings, request.options)?;
+            let mut sources = vec![Source::of("machine", &args.machine)];
+            sources.extend(args.recordings.iter().map(|path| Source::of("recording", path)));
+            sources.extend(args.effects.iter().map(|path| Source::of("effects", path)));
+            let measured = Measured {
+                machine: &seen,
+                recordings: &recordings,
+                geometry: (&geometry, &fit),
+                diagnosis: Some((&diagnosis, model.as_ref())),
+                circular: &circular,
+            };
+            Some(of_measured(&measured, &Frame { command: "kincal diagnose", sources, notes })?)
         }
-    }
-    if let (Some(path), Some(model)) = (&args.output, model) {
+    };
+    drop(progress);
+    if let (Some(path), Some(model)) = (&args.output, &model) {
         write_whole(path, |out| {
             // Watched: an error here is told of the output.
             let _ = out.write_all(model.to_ron().as_bytes());
@@ -92,19 +125,14 @@ pub(crate) fn run(args: &Args) -> Outcome {
         })?;
         let _ = writeln!(text, "\nwritten to {}", path.display());
     }
-    if let Some(path) = &args.report {
-        write_report(path, &diagnosis)?;
+    if let (Some(path), Some(page)) = (&args.report, page) {
+        write_page(path, &page)?;
         let _ = writeln!(text, "\nreport written to {}", path.display());
     }
     args.common.say(&text)?;
-    args.common.write_json(&diagnosis)
-}
-
-/// The report, whole or not at all.
-pub(crate) fn write_report(path: &Path, diagnosis: &Diagnosis) -> Outcome {
-    write_whole(path, |out| {
-        // Watched: an error here is told of the output.
-        let _ = out.write_all(page::page(diagnosis).as_bytes());
-        Ok(())
+    args.common.write_json(&Told {
+        verdict: of_diagnosis(&diagnosis),
+        diagnosis: &diagnosis,
+        circular_tests: &circular,
     })
 }

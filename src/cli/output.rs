@@ -269,6 +269,11 @@ impl Common {
         }
     }
 
+    /// Whether a machine-readable result is wanted.
+    pub(crate) fn wants_json(&self) -> bool {
+        self.json.is_some()
+    }
+
     /// Prints for people, unless standard output belongs to JSON or nobody wants to read.
     pub(crate) fn say(&self, text: &str) -> Outcome {
         match self.json {

@@ -7,11 +7,17 @@ use crate::nc::Dialect;
 
 /// The FNV-1a hash of 64 bits, which takes what is written to it. It tells files apart that were mixed up, not ones that were forged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Fingerprint(u64);
+pub(crate) struct Fingerprint(u64);
 
 impl Default for Fingerprint {
     fn default() -> Self {
         Fingerprint(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl std::fmt::Display for Fingerprint {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:016x}", self.0)
     }
 }
 

@@ -38,6 +38,9 @@ pub struct Diagnosis {
     /// RMS under three models.
     #[serde(flatten, with = "rms")]
     pub rms: ByQuantity<Option<RmsByModel>>,
+    /// Combinations of constant deviations that come mostly from the data: so many numbers geometry has.
+    #[serde(default)]
+    pub geometry_numbers: u64,
     /// RMS over stretches that were left out of the fit.
     #[serde(flatten, with = "held_out_rms")]
     pub held_out_rms: ByQuantity<Option<HeldOutRms>>,

@@ -20,6 +20,12 @@ pub struct Finding {
     pub at: String,
     /// A sentence for a machinist.
     pub explanation: String,
+    /// What is at fault, as part of a sentence; empty where its family does not say.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub cause: String,
+    /// What to do about it; empty where its family does not say.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub remedy: String,
     /// Its sizes.
     pub coefficients: Vec<Size>,
     /// Probability that name and place are right, or are those of a hypothesis that the recordings cannot tell from it.

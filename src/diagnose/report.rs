@@ -205,6 +205,7 @@ pub(super) fn report(
             let left = rms_of(search, &left_over, quantity == Quantity::Angle);
             by_model(linear.fit.rms[quantity], left)
         }),
+        geometry_numbers: linear.fit.combinations.iter().filter(|c| c.share > 0.5).count() as u64,
         held_out_rms: ByQuantity::default(),
         set_ups_left_out,
         shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
@@ -403,6 +404,8 @@ fn finding(
         form: (candidate.told_as != candidate.effect).then(|| candidate.effect.clone()),
         at: candidate.place.name(machine),
         explanation: identified.sentence(machine, &sizes),
+        cause: family.cause.clone(),
+        remedy: identified.remedy(machine, &sizes),
         coefficients: sizes
             .into_iter()
             .map(|s| Size {

@@ -45,6 +45,11 @@ pub enum Along {
         /// Whether it turns.
         angle: bool,
     },
+    /// What gravity does to a joint (the first feature of the finding): its load, or the weight that it carries.
+    Load {
+        /// Its name.
+        name: String,
+    },
     /// Time, s.
     Time,
     /// Number of the sample, from 0, counted through all recordings.
@@ -65,6 +70,8 @@ pub struct Curve {
 /// A sample of a [`Curve`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CurvePoint {
+    /// Number of the sample, from 0, counted through all recordings.
+    pub sample: usize,
     /// Where, as [`Curve::along`] says.
     pub x: f64,
     /// Direction of travel: -1, 1; 0 where none is known or it does not matter.
@@ -134,7 +141,10 @@ pub(super) fn fill(
             Place::Pair(_, partner) => Some(partner),
             Place::Frame(_) | Place::Measurement => None,
         };
-        let curve = curve(search, machine, along, &without, last);
+        let mut curve = curve(search, machine, along, &without, last);
+        if let Some(load) = load_of(search, effect) {
+            against_load(&mut curve, &load);
+        }
         let square = |residual: &[f64]| -> f64 {
             (0..residual.len()).filter(|r| linear.angle[*r] == curve.angle).map(|r| residual[r].powi(2)).sum()
         };
@@ -160,6 +170,22 @@ fn readings_of(search: &Search, span: &Span, angle: bool) -> Vec<usize> {
 fn rows_of(search: &Search, span: &Span, reading: usize) -> impl Iterator<Item = usize> {
     let linear = search.rows.linear;
     (span.rows.0..span.rows.1).filter(move |row| linear.reading[*row] == reading)
+}
+
+/// By sample the load that a finding depends on, where it depends on gravity and on nothing that came before.
+fn load_of(search: &Search, effect: &ModelTerm) -> Option<Vec<f64>> {
+    let first = search.candidates[effect.candidate].features.first()?;
+    let stands = first.needs_gravity() && !first.needs_history();
+    stands.then(|| first.over(&search.rows.linear.samples, &effect.score.parameters))
+}
+
+/// The same curve against this load, the direction of travel left aside.
+fn against_load(curve: &mut Curve, load: &[f64]) {
+    let Along::Joint { name, .. } = &curve.along else { return };
+    curve.along = Along::Load { name: name.clone() };
+    for point in curve.runs.iter_mut().flatten() {
+        point.x = load.get(point.sample).copied().unwrap_or(f64::NAN);
+    }
 }
 
 /// `along`: dyad of the joint against which it is shown; without one it runs along time.
@@ -209,7 +235,8 @@ fn curve(search: &Search, machine: &Machine, along: Option<usize>, without: &[f6
             };
             let goes_on = before.is_some_and(|(d, t)| d == direction && time - t <= span.pause_after);
             before = Some((direction, time));
-            let point = CurvePoint { x, direction, residual: without[row], effect: without[row] - with[row] };
+            let point =
+                CurvePoint { sample, x, direction, residual: without[row], effect: without[row] - with[row] };
             match curve.runs.last_mut().filter(|_| goes_on) {
                 Some(run) => run.push(point),
                 None => curve.runs.push(vec![point]),

@@ -86,6 +86,12 @@ pub struct Family {
     pub coefficients: Vec<Output>,
     /// One sentence for a machinist; names in braces stand for coefficients, `{at}` for the place, `{partner}` for the other joint.
     pub sentence: String,
+    /// What is at fault where it is found, as part of a sentence.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub cause: String,
+    /// What to do about it: adjust, replace, enter a value, compensate, measure; names in braces as in the sentence.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub remedy: String,
     /// What it may be taken for.
     #[serde(default)]
     pub look_alikes: Vec<LookAlike>,

@@ -272,8 +272,16 @@ impl Identified<'_> {
 
     /// One sentence for a machinist, with these sizes in it.
     pub fn sentence(&self, machine: &Machine, sizes: &[SizeOf]) -> String {
-        let mut text = self.family.sentence.clone();
-        text = text.replace("{at}", &self.candidate.place.name(machine));
+        self.with_sizes(&self.family.sentence, machine, sizes)
+    }
+
+    /// What to do about it, with these sizes in it.
+    pub fn remedy(&self, machine: &Machine, sizes: &[SizeOf]) -> String {
+        self.with_sizes(&self.family.remedy, machine, sizes)
+    }
+
+    fn with_sizes(&self, text: &str, machine: &Machine, sizes: &[SizeOf]) -> String {
+        let mut text = text.replace("{at}", &self.candidate.place.name(machine));
         if let Some(partner) = self.candidate.place.partner(machine) {
             text = text.replace("{partner}", &partner);
         }

@@ -344,11 +344,13 @@ fn check_sentence(family: &Family) -> Checked<()> {
     let mut known: Vec<&str> = vec!["at"];
     known.extend(family.partner.map(|_| "partner"));
     known.extend(family.coefficients.iter().map(|o| o.name.as_str()).filter(|name| !name.is_empty()));
-    for part in family.sentence.split('{').skip(1) {
-        let name = part.split('}').next().unwrap_or_default();
-        if !part.contains('}') || !known.contains(&name) {
-            let what = format!("the sentence asks for {{{name}}}");
-            return Err(("sentence".into(), fault(what, format!("names in braces: {}", known.join(", ")))));
+    for (field, text) in [("sentence", &family.sentence), ("remedy", &family.remedy)] {
+        for part in text.split('{').skip(1) {
+            let name = part.split('}').next().unwrap_or_default();
+            if !part.contains('}') || !known.contains(&name) {
+                let what = format!("the {field} asks for {{{name}}}");
+                return Err((field.into(), fault(what, format!("names in braces: {}", known.join(", ")))));
+            }
         }
     }
     if family.sentence.trim().is_empty() {

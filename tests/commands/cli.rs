@@ -169,7 +169,8 @@ fn redacted(text: &str) -> String {
     let word = |word: &str| {
         if word.contains('.') && !word.ends_with(".csv") { hide(word) } else { word.to_string() }
     };
-    let line = |line: &str| match line.contains('±') && line.contains('%') {
+    let is_measured = |line: &str| line.contains("um/m") || line.contains(" um towards ");
+    let line = |line: &str| match line.contains('±') && line.contains('%') || is_measured(line) {
         true => hide(line),
         false => line.split(' ').map(word).collect::<Vec<_>>().join(" "),
     };
@@ -220,7 +221,7 @@ fn calibrate_writes_a_file_that_reads_back() {
     let (rec, ron) = (folder.write("rec.csv", &tracker("hall", 60)), folder.path("calibrated.ron"));
     let text = done(&["calibrate", MACHINE, &rec, "-o", &ron]);
     assert!(
-        text.starts_with("ac_table_tilting: 58 samples in 1 recording, 2 rows left out as drop-outs\n"),
+        text.contains("\n\nac_table_tilting: 58 samples in 1 recording, 2 rows left out as drop-outs\n"),
         "{text}"
     );
     assert!(text.ends_with(&format!("written to {ron}\n")), "{text}");
@@ -365,7 +366,10 @@ fn json_goes_to_a_file_or_alone_to_standard_output_and_quiet_says_nothing() {
     let (folder, rec, ron) = calibrated("json");
     let file = folder.path("result.json");
     let text = done(&["calibrate", MACHINE, &rec, "--json", &file]);
-    assert!(text.starts_with("ac_table_tilting: 58 samples"));
+    assert!(
+        text.starts_with("The machine is ") && text.contains("\n\nac_table_tilting: 58 samples"),
+        "{text}"
+    );
     assert_eq!(json(&folder.read("result.json")), json(&done(&["calibrate", MACHINE, &rec, "--json", "-"])));
     for args in [
         vec!["describe", MACHINE],

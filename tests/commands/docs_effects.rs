@@ -145,3 +145,12 @@ fn every_word_of_the_language_is_taught() {
         );
     }
 }
+
+#[test]
+fn every_family_says_what_is_at_fault_and_what_to_do() {
+    for family in Library::standard().families() {
+        assert!(!family.cause.is_empty() && !family.remedy.is_empty(), "{}", family.name);
+        // They stand within sentences.
+        assert!(!family.remedy.ends_with('.') && !family.cause.ends_with('.'), "{}", family.name);
+    }
+}

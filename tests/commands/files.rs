@@ -25,7 +25,7 @@ const fn row(
 const TABLE: [Row; 15] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
-    row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--json"]),
+    row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--report", "--json"]),
     row("compare", &[], &["MACHINE.ron", "REC.csv", "--judge", "--truth"], &["--json"]),
     row("predict", &[], &["CALIBRATED.ron", "REC.csv", "BESIDE.csv"], &["--output", "--json"]),
     row("join", &["--as", "n"], &["REC.csv", "OTHER.csv"], &["--output", "--json"]),
@@ -34,7 +34,7 @@ const TABLE: [Row; 15] = [
         "compensate",
         &[],
         &["CALIBRATED.ron", "PROGRAM.nc", "--setup", "--m-codes"],
-        &["--output", "--json"],
+        &["--output", "--report", "--json"],
     ),
     row(
         "verify",

@@ -19,6 +19,7 @@ mod loads;
 mod machines_in;
 mod outputs;
 mod program;
+mod report;
 mod simulate;
 mod streams;
 mod verdict;

@@ -1,4 +1,4 @@
-//! What a diagnosis says on the terminal.
+//! What there is to say of a diagnosis, a line each: on the terminal and on the page.
 
 use std::fmt::Write;
 
@@ -12,7 +12,7 @@ use crate::feature::Dimension;
 use crate::cli::output::{count, decimals, length};
 
 /// A length or an angle, as people on a shop floor say it: um, mm; arcsec, deg.
-pub(crate) fn amount(si: f64, angle: bool) -> String {
+pub(super) fn amount(si: f64, angle: bool) -> String {
     if angle { in_words(si, None, Dimension::ANGLE, None) } else { length(si) }
 }
 
@@ -21,47 +21,13 @@ fn both<T: Copy>(lengths: Option<T>, angles: Option<T>) -> Vec<(T, bool)> {
     lengths.map(|x| (x, false)).into_iter().chain(angles.map(|x| (x, true))).collect()
 }
 
-/// Everything.
-pub(crate) fn render(diagnosis: &Diagnosis) -> String {
-    let mut text = head(diagnosis);
-    for (i, finding) in diagnosis.findings.iter().enumerate() {
-        let _ = writeln!(text, "\n{}. {}", i + 1, finding.explanation);
-        for line in about(diagnosis, finding) {
-            let _ = writeln!(text, "   {line}");
-        }
-    }
-    for line in beside(diagnosis) {
-        let _ = writeln!(text, "\n{line}");
-    }
-    if let Some(unexplained) = &diagnosis.unexplained {
-        let _ = writeln!(text, "\nunexplained: {}", unexplained.explanation);
-        for line in about_unexplained(unexplained) {
-            let _ = writeln!(text, "   {line}");
-        }
-    } else if diagnosis.findings.is_empty() {
-        let _ = writeln!(text, "\n{CALM}");
-    }
-    for timeless in diagnosis.not_tried.iter().filter(|n| n.for_want_of_time) {
-        let names = timeless.effects.join(", ");
-        let _ = writeln!(text, "\nnot tried, since a recording has no column t: {names}");
-    }
-    for far_off in &diagnosis.far_off {
-        let _ = writeln!(
-            text,
-            "\nnote: frame {} lies {:.0} tolerances from where the machine file has it: check its declaration, or state a larger tolerance there",
-            far_off.frame, far_off.tolerances
-        );
-    }
-    text
-}
-
 /// Effects that could not be looked for, a line for each reason.
-pub(crate) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
+pub(super) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
     diagnosis.not_tried.iter().map(|n| format!("{}: {}", n.effects.join(", "), n.because)).collect()
 }
 
 /// What the model has beside the findings, a line each: joints that have an effect of theirs too, and sides of approach.
-pub(crate) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
+pub(super) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
     let mut by_effect: Vec<(&str, bool, Vec<&str>)> = Vec::new();
     for Companion { effect, at, of_set_up } in &diagnosis.companions {
         match by_effect.iter_mut().find(|(known, ..)| known == effect) {
@@ -101,29 +67,10 @@ pub(crate) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
 }
 
 /// Where there is nothing to be found.
-pub(crate) const CALM: &str = "Constant geometry explains these recordings down to their noise: there is nothing else to be found in them.";
-
-/// Machine, recordings, noise, root mean squares.
-fn head(diagnosis: &Diagnosis) -> String {
-    let names = &diagnosis.recordings;
-    let shown = match names.len() {
-        0..=6 => names.join(", "),
-        n => format!("{} ... {}", names[0], names[n - 1]),
-    };
-    let mut text = format!(
-        "{}: {} in {} ({shown})\n",
-        diagnosis.machine,
-        count(diagnosis.samples, "sample", "samples"),
-        count(names.len() as u64, "recording", "recordings"),
-    );
-    for line in figures(diagnosis) {
-        let _ = writeln!(text, "{line}");
-    }
-    text
-}
+pub(super) const CALM: &str = "Constant geometry explains these recordings down to their noise: there is nothing else to be found in them.";
 
 /// What was looked at, noise and root mean squares, a line each.
-pub(crate) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
+pub(super) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(Thinned { every, samples }) = diagnosis.thinned {
         lines.push(format!(
@@ -232,7 +179,7 @@ fn outliers(diagnosis: &Diagnosis) -> Vec<String> {
 }
 
 /// What there is to say of a finding besides its sentence.
-pub(crate) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
+pub(super) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
     let mut lines = vec![format!(
         "{} at {}, probability {}; it explains {} of what geometry left over",
         finding.name(),
@@ -271,7 +218,7 @@ pub(crate) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
 }
 
 /// Which measurements would tell a finding from its rivals, each with the rivals that it tells apart.
-pub(crate) fn tests(finding: &Finding) -> Vec<(&str, Vec<String>)> {
+pub(super) fn tests(finding: &Finding) -> Vec<(&str, Vec<String>)> {
     let mut tests: Vec<(&str, Vec<String>)> = Vec::new();
     for other in &finding.confusable_with {
         let name = if other.at == finding.at {
@@ -288,21 +235,24 @@ pub(crate) fn tests(finding: &Finding) -> Vec<(&str, Vec<String>)> {
 }
 
 /// What there is to say of a structure without a name.
-pub(crate) fn about_unexplained(unexplained: &Unexplained) -> Vec<String> {
+pub(super) fn about_unexplained(unexplained: &Unexplained) -> Vec<String> {
     let mut lines = Vec::new();
     lines.extend(unexplained.parts.iter().map(part));
     if let Some(places) = places(&unexplained.r#where, usize::MAX) {
         lines.push(format!("it stands out in {places}"));
     }
-    if unexplained.at != "measurement" {
-        lines.push(format!(
-            "next test: a path on which {0} moves on its own, slowly, to and fro over all of its travel, twice",
-            unexplained.at
-        ));
-    } else {
-        lines.push("next test: the same path once more, and a stretch at rest".into());
-    }
+    lines.push(format!("next test: {}", next_test(unexplained)));
     lines
+}
+
+/// Which measurement shows more of a structure without a name.
+pub(super) fn next_test(unexplained: &Unexplained) -> String {
+    match unexplained.at.as_str() {
+        "measurement" => "the same path once more, and a stretch at rest".into(),
+        at => {
+            format!("a path on which {at} moves on its own, slowly, to and fro over all of its travel, twice")
+        }
+    }
 }
 
 /// One part: its place, what it follows, how large it is, and whether the model has it.
@@ -357,7 +307,7 @@ fn places(list: &[Where], recordings: usize) -> Option<String> {
 }
 
 /// Two digits, and never a certainty.
-pub(crate) fn probability(p: f64) -> String {
+pub(super) fn probability(p: f64) -> String {
     match p {
         p if p > 0.995 => "> 0.99".into(),
         p if p < 0.005 => "< 0.01".into(),
