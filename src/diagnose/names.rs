@@ -11,6 +11,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use super::contained::says_no_more;
 use super::enter::solved;
 use super::evidence::{evidence, log_mean_exp, log_sum_exp};
 use super::marginal::Marginal;
@@ -126,7 +127,9 @@ impl Unnamed {
             likely.push((here.clone(), listed.collect()));
             let probability = names.all[0].probability;
             all.push(names.best.clone());
-            is_open &= probability > LIKELY && is_foretold(search, &all, all.len() - 1);
+            let last = all.len() - 1;
+            let holds = || is_foretold(search, &all, last) && !says_no_more(search, &all, last);
+            is_open &= probability > LIKELY && holds();
             if !is_open {
                 continue;
             }
