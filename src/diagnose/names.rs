@@ -22,6 +22,8 @@ use crate::feature::Dependence;
 
 /// Parts of its size by which the shape of what happens may depart from its family's; each is as likely beforehand.
 const DEPARTURES: [f64; 3] = [0.05, 0.1, 0.2];
+/// By more than twice the largest of these nothing departs from its family: functions of a few coefficients have wide tails.
+const FARTHEST: f64 = 0.4;
 
 /// How often what is found has no name.
 const NAMELESS: f64 = 0.2;
@@ -207,6 +209,9 @@ impl Unnamed {
             let c = plain.candidate;
             // It departs by a part of its own size: what does next to nothing explains nothing by departing from it.
             let size = (2.0 * plain.score.gain.max(0.0) / energy).sqrt().min(1.0);
+            if 1.0 - size * size > (FARTHEST * size).powi(2) {
+                continue;
+            }
             let Some(term) = search.enter_bare(plain, &ground) else { continue };
             // What the family does itself is no departure from it.
             let departure = ground.across(&departure, &term.columns);
