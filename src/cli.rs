@@ -4,6 +4,7 @@ mod calibrate;
 mod check;
 mod compare;
 mod compensate;
+mod completions;
 mod convert;
 mod demo;
 mod describe;
@@ -15,6 +16,7 @@ mod import;
 mod join;
 mod location;
 mod machines;
+mod man;
 mod output;
 mod part;
 mod predict;
@@ -70,6 +72,10 @@ enum Command {
     Export(export::Args),
     /// The machines that come with the program, or the file of one of them
     Machines(machines::Args),
+    /// What lets a shell complete commands, options and files
+    Completions(completions::Args),
+    /// The manual page of the program, or of one command
+    Man(man::Args),
     /// The reference machine, a simulated ballbar recording, and its calibration; needs no input
     Demo(demo::Args),
 }
@@ -127,6 +133,8 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Convert(args) => convert::run(args, files),
         Command::Export(args) => export::run(args),
         Command::Machines(args) => machines::run(args),
+        Command::Completions(args) => completions::run(args, Cli::command()),
+        Command::Man(args) => man::run(args, Cli::command()),
         Command::Demo(args) => demo::run(args),
     }
 }

@@ -78,10 +78,13 @@ pub struct Meaningless {
 }
 
 impl Finding {
-    /// Names that cannot be told from its own let it be told; what they have for themselves is theirs.
+    /// Names that cannot be told from its own count for its own: to the others goes what that leaves.
     pub(super) fn share_out(&mut self) {
         let others: f64 = self.confusable_with.iter().map(|other| other.probability).sum();
-        self.probability = self.probability.min(1.0 - others).max(0.0);
+        let left = (1.0 - self.probability).max(0.0);
+        if others > left {
+            self.confusable_with.iter_mut().for_each(|other| other.probability *= left / others);
+        }
     }
 }
 

@@ -270,7 +270,8 @@ impl Unnamed {
         let together = evidence(&usual_gram, &usual_toward, usual.ncols(), overdispersion, 0).evidence;
         // One of the free functions, or a set of several: nobody knows beforehand which.
         let one = log_mean_exp(&each.collect::<Vec<f64>>());
-        let several = |k: usize| ((compared.len() - k) as f64 / (k + 1) as f64).ln();
+        let count = free.len().max(functions.len());
+        let several = |k: usize| ((count - k) as f64 / (k + 1) as f64).ln();
         let sets: f64 = (0..functions.len()).map(several).sum();
         let nameless = if functions.len() > 1 { log_mean_exp(&[one, together - sets]) } else { one };
         let spread = gram.trace();

@@ -521,3 +521,22 @@ fn faults_of_recordings_reach_the_user() {
         "error: there is only one sample in all recordings\n  = record the same quantity at many positions of the joints\n"
     );
 }
+
+#[test]
+fn completions_and_manual_pages_know_every_command() {
+    let help = done(&["--help"]);
+    let commands =
+        help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let commands: Vec<&str> = commands.filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(commands.contains(&"diagnose"), "{help}");
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let text = done(&["completions", shell]);
+        assert!(commands.iter().all(|command| text.contains(command)), "{shell}");
+    }
+    let page = done(&["man"]);
+    assert!(commands.iter().all(|command| page.contains(command)), "{page}");
+    let page = done(&["man", "diagnose"]);
+    assert!(page.contains("kincal diagnose") && page.contains("\\-\\-report"), "{page}");
+    let said = fails(1, &["man", "diagnoze"]);
+    assert!(said.contains("\"diagnoze\"") && said.contains("`kincal --help` lists them"), "{said}");
+}

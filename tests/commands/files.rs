@@ -22,7 +22,7 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 15] = [
+const TABLE: [Row; 17] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--report", "--json"]),
@@ -52,6 +52,8 @@ const TABLE: [Row; 15] = [
     row("convert", &[], &["FILE", "--machine", "--map"], &["--write-map", "--output", "--json"]),
     row("export", &["--to", "urdf"], &["CALIBRATED.ron", "--base-file"], &["--output", "--json"]),
     row("machines", &[], &[], &["--json"]),
+    row("completions", &["bash"], &[], &[]),
+    row("man", &[], &[], &[]),
     row("demo", &[], &[], &["--report", "--json"]),
 ];
 
