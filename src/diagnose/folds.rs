@@ -241,10 +241,9 @@ fn grams(
     (0..=owner.iter().copied().max().unwrap_or(0)).map(one).collect()
 }
 
-/// What foretells stretches that were left out: effects without which these are foretold better go, the worst first, and all of them where
-/// together they do worse than geometry alone. Settled positions are few, and where none is repeated nothing tells their noise: there every
-/// effect has to prove itself. In motion that has to be so by more than a standard error; what is
-/// undecided stays.
+/// What foretells stretches that were left out, (68): effects without which these are foretold better go, the worst first, and all of them
+/// where together they do worse than geometry alone. In motion that has to be so by more than a standard error; what is undecided stays.
+/// Settled positions are few, and where none is repeated nothing tells their noise: there every effect has to prove itself.
 pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> {
     let mut kept = in_model.to_vec();
     let is_harm = |(gain, error): &(f64, f64)| if search.in_motion { *gain < -error } else { *gain < 0.0 };

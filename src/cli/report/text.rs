@@ -278,7 +278,7 @@ fn part(part: &UnnamedPart) -> String {
         if part.modelled {
             "the model has it"
         } else {
-            "told only, since it is not foretold any better with it"
+            "told only, since too little of what was left out is foretold with it"
         }
     )
 }

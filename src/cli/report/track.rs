@@ -2,6 +2,7 @@
 
 use crate::calibration::CalibratedMachine;
 use crate::circular::stride;
+use crate::effects::RecordingFacts;
 use crate::error::Result;
 use crate::machine::{JointKind, Machine};
 use crate::motion::{FirstDirections, Tracker};
@@ -11,10 +12,8 @@ use crate::units::Rms;
 
 /// Motion against the direction of travel that is no reversal yet, as a part of the range.
 const DEAD_BAND: f64 = 1e-5;
-/// Where a step of the path, of the usual kind, goes farther than this part of a joint's range, the samples are settled positions.
-const FAR: f64 = 0.04;
 /// A recording of fewer samples has dots, not lines.
-const FEW: usize = 200;
+const FEW: u64 = 200;
 
 /// A model under which residuals are looked at.
 pub(super) struct Stage<'a> {
@@ -117,7 +116,9 @@ fn of_recording(machine: &Machine, recording: &Recording, stages: &[Vec<f64>]) -
         }
         behind += chunk.len;
     }
-    let settled = is_settled(&commands, &ranges);
+    // As the diagnosis sees it; without times nobody knows of a path.
+    let facts = RecordingFacts::of(machine, std::slice::from_ref(recording))?;
+    let settled = facts.settled || facts.time.is_none() || summary.samples <= FEW;
     let (width, parts): (usize, Vec<(bool, std::ops::Range<usize>)>) = match recording.header().measurement {
         Measurement::Pose => (6, vec![(false, 0..3), (true, 3..6)]),
         Measurement::Position => (3, vec![(false, 0..3)]),
@@ -145,16 +146,4 @@ fn of_recording(machine: &Machine, recording: &Recording, stages: &[Vec<f64>]) -
         residuals: stages.iter().map(|flat| of(flat, part)).collect(),
     };
     Ok(parts.iter().map(track).collect())
-}
-
-/// Whether neighbours in time stand anywhere, so that no line joins them.
-fn is_settled(commands: &[Vec<f64>], ranges: &[(f64, f64)]) -> bool {
-    if commands.first().is_none_or(|all| all.len() <= FEW) {
-        return true;
-    }
-    commands.iter().zip(ranges).any(|(all, (from, to))| {
-        let mut steps: Vec<f64> = all.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-        steps.sort_by(f64::total_cmp);
-        steps.get(steps.len() / 2).is_some_and(|step| *step > FAR * (to - from) && to > from)
-    })
 }
