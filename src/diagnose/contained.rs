@@ -102,7 +102,9 @@ pub(super) fn prefer_simpler(
         let own = beside(&own, &constant);
         let is_less = less.iter().any(|less| left(&own, less) < CONTAINED && left(less, &own) < CONTAINED);
         let added = if is_less { LITTLE } else { NOTHING };
-        if left(&own, &wide) < CONTAINED && left(&does, &own) < added {
+        // What says the same with other numbers is no simpler.
+        let is_wider = left(&wide, &own) > CONTAINED;
+        if is_wider && left(&own, &wide) < CONTAINED && left(&does, &own) < added {
             hypotheses[i].weight = hypotheses[i].weight.max(best.weight + LIKELIER);
         }
     }

@@ -219,7 +219,29 @@ impl Search<'_> {
         }
         prefer_simpler(self, &mut hypotheses, close, &field.marginal);
         hypotheses.sort_by(better_first);
+        self.likeliest_name_first(&mut hypotheses);
         hypotheses
+    }
+
+    /// A name is as likely as all its forms at its place together: the best form of the likeliest one comes first.
+    fn likeliest_name_first(&self, hypotheses: &mut [Hypothesis]) {
+        let Some(most) = hypotheses.first().map(|best| best.weight) else { return };
+        let mut names: Vec<(usize, f64)> = Vec::new();
+        for (i, r) in hypotheses.iter().enumerate() {
+            let weight = (r.weight - most).exp();
+            match names.iter_mut().find(|(first, _)| self.is_form(hypotheses[*first].candidate, r.candidate))
+            {
+                Some((_, sum)) => *sum += weight,
+                // One that is less than a thousandth as likely does not become the likeliest by its forms.
+                None if weight > 1e-3 => names.push((i, weight)),
+                None => {}
+            }
+        }
+        // The earlier of two that are as likely.
+        let likeliest = names.into_iter().rev().max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((i, _)) = likeliest {
+            hypotheses[..=i].rotate_right(1);
+        }
     }
 
     /// A hypothesis where chance is larger than what it was searched with.

@@ -282,6 +282,7 @@ fn candidate(
         }
         for (name, slot, direction, unit) in &directions {
             let size = if *unit == Dimension::ANGLE { family.size.urad } else { family.size.um } * 1e-6;
+            let size = if index > 0 { size * family.others.unwrap_or(1.0) } else { size };
             let name = if directions.len() > 1 { name.clone() } else { String::new() };
             let part = Part { slot: *slot, direction: *direction, feature: index };
             coefficients.push(Coefficient {

@@ -54,6 +54,9 @@ pub struct Family {
     /// Size of the deviation, root mean square, that is usual on machines in use.
     #[serde(default)]
     pub size: Size,
+    /// Features behind the first are usually so much smaller, as a part of that size.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub others: Option<f64>,
     /// Coefficients up to this, SI, are usual however large the deviation becomes by what they multiply: a delay is as long as the
     /// control makes it, and what it does grows with the speed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
