@@ -64,6 +64,6 @@ def circled(command: CommandLine) -> Path:
     path = command.folder / "circled.csv"
     faults = command.folder / "faults.ron"
     faults.write_text('Faults(units: (length: um, angle: arcsec), backlash: [(joint: "x", width: 12)])')
-    circle = ["--test", "circle", "--plane", "x,y", "--length", "100mm", "--sense", "both", "--rate", "10", "--noise", "0.3um"]
+    circle = ["--test", "circle", "--plane", "x,y", "--length", "100mm", "--sense", "both", "--rate", "5", "--noise", "0.3um"]
     command.json("simulate", MACHINES / "xyz_mill.ron", *circle, "--faults", faults, "-o", path)
     return path

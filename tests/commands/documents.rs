@@ -38,7 +38,7 @@ fn same(shown: &str, printed: &str) -> bool {
 }
 
 /// Says where `shown` is not in `printed`, line by line; a line `...` stands for any lines left out.
-fn compare(shown: &[String], printed: &[&str]) -> Result<(), String> {
+pub fn compare(shown: &[String], printed: &[&str]) -> Result<(), String> {
     let mut at = 0;
     for run in shown.split(|line| line.trim() == "...") {
         // Blank lines next to `...` belong to the document.
