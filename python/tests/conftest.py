@@ -50,7 +50,7 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> CommandLine:
 def tracked(command: CommandLine) -> Path:
     """A tracker on a SCARA arm whose errors are drawn from its tolerances; one reading is lost."""
     path = command.folder / "tracked.csv"
-    poses = ["--test", "poses", "--count", "40", "--measure", "position", "--noise", "10um", "--random", "3"]
+    poses = ["--test", "poses", "--count", "30", "--measure", "position", "--noise", "10um", "--random", "3"]
     command.json("simulate", MACHINES / "scara.ron", *poses, "-o", path)
     lines = path.read_text().splitlines()
     lines[-3] = ",".join([*lines[-3].split(",")[:-1], ""])

@@ -7,7 +7,7 @@ from typing import Any
 import kincal
 import numpy as np
 import pytest
-from conftest import MACHINES, CommandLine, columns_of
+from conftest import MACHINES, CommandLine
 
 
 @pytest.fixture
@@ -41,14 +41,16 @@ def test_a_machine_file_is_told_with_line_and_column(command: CommandLine) -> No
         kincal.parse_machine(path.read_text(), "other.ron")
 
 
-def test_what_is_nonsense_is_refused_unless_it_is_wanted(tracked: Path, scara: kincal.Machine) -> None:
-    columns, head = columns_of(tracked)
-    columns["q1[deg]"] = -columns["q1[deg]"]
-    recording = kincal.Recording(columns, head)
+def test_what_is_nonsense_is_refused_unless_it_is_wanted() -> None:
+    axis = kincal.load_machine(MACHINES / "linear_axis.ron")
+    x = np.linspace(0.0, 0.4, 12)
+    p = axis.poses(x[:, None])[:, :3, 3] + 1e-6 * np.sin(50 * np.arange(36)).reshape(12, 3)
+    columns = {"x[m]": x[::-1], "px[m]": p[:, 0], "py[m]": p[:, 1], "pz[m]": p[:, 2]}
+    recording = kincal.Recording(columns, {"measurement": "position"})
     with pytest.raises(kincal.Error, match="do not belong together") as told:
-        kincal.calibrate(scara, recording)
-    assert "q1" in str(told.value) and "force=True goes on all the same" in told.value.mend
-    _, fit = kincal.calibrate(scara, recording, force=True)
+        kincal.calibrate(axis, recording)
+    assert "in the opposite order" in told.value.what and told.value.mend.endswith("force=True goes on all the same")
+    _, fit = kincal.calibrate(axis, recording, force=True)
     assert fit["rms_m"]["geometric"] > 1e-3
 
 
