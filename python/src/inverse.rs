@@ -9,6 +9,8 @@ use pyo3::types::PyDict;
 use crate::failure::told;
 use crate::machine::{Machine, floats};
 
+/// The largest joint position, m or rad, as of recordings.
+const FARTHEST: f64 = 1e9;
 /// How far a rotation matrix may be from one: rounding of seven digits.
 const ROUNDING: f64 = 1e-6;
 
@@ -66,18 +68,27 @@ pub fn inverse<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let names = machine.names();
     let goals = self::poses(poses, "pose")?;
-    let tips = tip.map(|tip| self::poses(tip, "tip")).transpose()?;
-    let t_from_tip = tips.and_then(|tips| tips.first().copied()).unwrap_or(Pose::identity(0.0));
+    let t_from_tip = match tip.map(|tip| self::poses(tip, "tip")).transpose()?.as_deref() {
+        None => Pose::identity(0.0),
+        Some([tip]) => *tip,
+        Some(tips) => {
+            return Err(told(
+                py,
+                format!("{} tips are given", tips.len()),
+                "give one, an array of shape (4, 4)",
+            ));
+        }
+    };
     let starts = match start {
         Some(start) => machine.rows(start)?,
         None => vec![vec![0.0; names.len()]],
     };
     if starts.len() != 1 && starts.len() != goals.len() {
-        let what = format!("{} starts are given for {} poses", starts.len(), goals.len());
+        let what = format!("starts: {}, poses: {}", starts.len(), goals.len());
         return Err(told(py, what, "give one start for each pose, or one for the first"));
     }
-    if starts.iter().flatten().any(|value| !value.is_finite()) {
-        return Err(told(py, "a start is no finite number", "give joint positions in m and rad"));
+    if !starts.iter().flatten().all(|value| value.abs() <= FARTHEST) {
+        return Err(told(py, "a start is no number below 1e9", "give joint positions in m and rad"));
     }
     if let Some(other) = free.iter().flatten().find(|name| !names.contains(name)) {
         let what = format!("\"{other}\" is no joint of machine \"{}\"", machine.calibrated.machine().name());

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use kincal::recording::RecordingFault;
 use kincal::{Machine, Place, face};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyMapping;
 
@@ -20,11 +21,25 @@ pub struct Recording {
 }
 
 /// What stands behind a key of the head.
-#[derive(FromPyObject)]
 enum Value {
     Text(String),
     Number(f64),
     Numbers(Vec<f64>),
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for Value {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(text) = value.extract() {
+            return Ok(Value::Text(text));
+        }
+        if let Ok(number) = value.extract() {
+            return Ok(Value::Number(number));
+        }
+        let numbers = value.extract().map(Value::Numbers);
+        numbers.map_err(|_| PyTypeError::new_err("a header key takes a text, a number, or several numbers"))
+    }
 }
 
 impl Value {
@@ -49,6 +64,13 @@ impl Recording {
         head: &Bound<'_, PyMapping>,
         name: &str,
     ) -> PyResult<Self> {
+        if name.contains(['\n', '\r', '\0']) {
+            return Err(told(py, format!("name {name:?} has a line break"), "give it a name in one line"));
+        }
+        if columns.is_empty()? {
+            let mend = "give an array for each joint and for what was measured, such as x[mm] and px[mm]";
+            return Err(told(py, format!("{name}: no column is given"), mend));
+        }
         let mut text = String::new();
         for item in head.items()? {
             let (key, value) = item.extract::<(String, Value)>()?;
@@ -128,17 +150,44 @@ impl Recording {
 }
 
 /// A recording as a function takes it.
-#[derive(FromPyObject)]
 pub enum Given {
     Arrays(Py<Recording>),
     Path(PathBuf),
 }
 
+impl<'a, 'py> FromPyObject<'a, 'py> for Given {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(arrays) = value.cast::<Recording>() {
+            return Ok(Given::Arrays(arrays.to_owned().unbind()));
+        }
+        let path = value.extract().map(Given::Path);
+        path.map_err(|_| PyTypeError::new_err("a recording is the path of a file, or a kincal.Recording"))
+    }
+}
+
 /// One recording or several.
-#[derive(FromPyObject)]
 pub enum AllGiven {
     One(Given),
     Several(Vec<Given>),
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for AllGiven {
+    type Error = PyErr;
+
+    fn extract(value: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        match value.extract() {
+            Ok(one) => Ok(AllGiven::One(one)),
+            // What is no sequence is told as what it is not: a recording.
+            Err(error) => match value.try_iter() {
+                Ok(several) => {
+                    several.map(|one| one?.extract()).collect::<PyResult<_>>().map(AllGiven::Several)
+                }
+                Err(_) => Err(error),
+            },
+        }
+    }
 }
 
 /// What is to be opened, apart from Python: paths, and names with texts.

@@ -62,6 +62,7 @@ def test_what_is_nonsense_is_refused_unless_it_is_wanted() -> None:
         ({"q1,q2": [0]}, {}, "comma"),
         ({"q1[deg]": [0]}, {"measurement": "po\nsition"}, "line break"),
         ({"q1[deg]": ["a"]}, {}, "array of numbers"),
+        ({}, {}, "no column is given"),
     ],
 )
 def test_arrays_that_are_no_recording_are_told(columns: Any, head: Any, message: str) -> None:
@@ -91,10 +92,25 @@ def test_arguments_that_mean_nothing_are_told(scara: kincal.Machine, tracked: Pa
         scara.poses(np.zeros((3, 5)))
     with pytest.raises(kincal.Error, match="no homogeneous matrix"):
         kincal.inverse(scara, 2 * np.eye(4))
-    with pytest.raises(kincal.Error, match="no finite number"):
+    with pytest.raises(kincal.Error, match="no number below 1e9"):
         kincal.inverse(scara, np.eye(4), [np.nan, 0, 0, 0])
-    with pytest.raises(kincal.Error, match="2 starts are given for 1 pose"):
+    with pytest.raises(kincal.Error, match="2 tips are given"):
+        kincal.inverse(scara, np.eye(4), tip=np.stack([np.eye(4), np.eye(4)]))
+    with pytest.raises(kincal.Error, match="starts: 2, poses: 1"):
         kincal.inverse(scara, np.eye(4), np.zeros((2, 4)))
+
+
+def test_what_is_of_another_type_is_told_by_what_it_should_be(scara: kincal.Machine) -> None:
+    other: Any = 5
+    with pytest.raises(TypeError, match="a recording is the path of a file, or a kincal.Recording"):
+        kincal.calibrate(scara, other)
+    with pytest.raises(TypeError, match="a recording is the path of a file, or a kincal.Recording"):
+        kincal.calibrate(scara, ["rec.csv", other])
+    nothing: Any = None
+    with pytest.raises(TypeError, match="a text, a number, or several numbers"):
+        kincal.Recording({"q1[deg]": [0.0]}, {"measurement": nothing})
+    with pytest.raises(kincal.Error, match="line break"):
+        kincal.Recording({"q1[deg]": [0.0]}, {}, name="a\nb")
 
 
 def test_the_command_tells_its_status(command: CommandLine) -> None:
