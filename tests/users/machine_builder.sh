@@ -32,18 +32,20 @@ kincal check mill.ron --quiet --json check.json
 echo 'Faults(units: (length: um, angle: arcsec), backlash: [(joint: "c", width: 20)])' > faults.ron
 kincal simulate mill.ron --test poses --count 250 --measure position --random 1 --noise 1um --faults faults.ron --truth truth.ron --quiet -o tracker.csv
 kincal calibrate mill.ron tracker.csv -o calibrated.ron --quiet --json geometry.json
-kincal diagnose mill.ron tracker.csv --quiet --json found.json
+kincal diagnose mill.ron tracker.csv -o with_play.ron --quiet --json found.json
 printf '%s\n' 'G90 G21 G94' 'G0 X0 Y0 Z50 B0 C0' 'G1 X50 Y20 Z10 F1000 (corner)' 'X-50 Y40 B10 C90' 'G1 Z60' 'M30' > part.nc
-kincal compensate calibrated.ron part.nc -o part_compensated.nc --quiet --json compensated.json
-kincal verify part.nc part_compensated.nc calibrated.ron --quiet --json verified.json
+kincal compensate with_play.ron part.nc -o part_compensated.nc --quiet --json compensated.json
+kincal verify part.nc part_compensated.nc with_play.ron --quiet --json verified.json
 
 # What there has to be.
 holds() { awk "BEGIN { exit !($1) }" || { echo "$0: $2" >&2; exit 1; }; }
 of() { awk -F'[:,]' -v key="\"$1\"" '$1 ~ key { print $2 + 0; exit }' "$2"; }
+# By the drawing: the table 100 mm to the left, and the head lying down, 180 mm long.
+grep -q 'at (-80.0000, 0.0000, 180.0000) mm' described.txt || { echo "$0: the machine file is not the drawing" >&2; exit 1; }
 holds "$(of geometric geometry.json) < 0.3 * $(of nominal geometry.json)" "the geometry is not found"
 grep -q '"effect": "backlash"' found.json || { echo "$0: the play of C is not named" >&2; exit 1; }
 cmp -s part.nc part_compensated.nc && { echo "$0: the program was not changed" >&2; exit 1; }
 grep -q '(corner)' part_compensated.nc
 # As it was written the program does not bring the tool of this machine where it should.
-if kincal verify part.nc part.nc calibrated.ron --quiet 2> /dev/null; then echo "$0: the program needs no correction" >&2; exit 1; fi
+if kincal verify part.nc part.nc with_play.ron --quiet 2> /dev/null; then echo "$0: the program needs no correction" >&2; exit 1; fi
 echo "machine builder: $(sed -n 's/.*"verdict": "\(.*\)",/\1/p' found.json)"
