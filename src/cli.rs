@@ -10,6 +10,7 @@ mod demo;
 mod describe;
 mod diagnose;
 mod export;
+pub mod face;
 mod failure;
 mod files;
 mod import;
@@ -26,6 +27,7 @@ mod simulate;
 mod verdict;
 mod verify;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -93,8 +95,13 @@ pub(crate) struct Common {
 
 /// Runs the command line: 0 done, 1 input at fault, 2 usage.
 pub fn run() -> ExitCode {
+    ExitCode::from(run_with(std::env::args_os()))
+}
+
+/// The same with these arguments, the name of the program first.
+fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let mut known = Cli::command();
-    let matches = known.try_get_matches_from_mut(std::env::args_os());
+    let matches = known.try_get_matches_from_mut(arguments);
     let parsed = matches.and_then(|matches| {
         let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut known))?;
         let named = matches.subcommand().and_then(|(name, own)| Some((known.find_subcommand(name)?, own)));
@@ -109,10 +116,10 @@ pub fn run() -> ExitCode {
         }
     };
     match outcome {
-        Ok(()) => ExitCode::from(status),
+        Ok(()) => status,
         Err(failure) => {
             complain(&failure);
-            ExitCode::from(1)
+            1
         }
     }
 }

@@ -182,7 +182,7 @@ pub use calibration::{CalibratedMachine, LeftOut};
 pub use chain::{Chain, Sweep};
 #[cfg(feature = "cli")]
 #[doc(hidden)]
-pub use cli::run as run_command_line;
+pub use cli::{face, run as run_command_line};
 pub use error::{Error, Place, Result};
 pub use machine::Machine;
 /// The linear algebra of this crate's interface: [`lie`] converts to and from its poses and vectors.

@@ -8,6 +8,7 @@ use crate::circular::{CircularTest, circular_tests};
 use crate::identify::{CalibrateOptions, ErrorModel, Figures, Fit, Loss, Solver, calibrate_model};
 use crate::machine::JointKind;
 use crate::machine::Machine;
+use crate::recording::Recording;
 use crate::units::Rms;
 use crate::units::{Quantity, Unit, amount};
 use crate::variation::{Directions, MOST_AXES, Varying};
@@ -175,25 +176,35 @@ impl Args {
 
 /// What is told in JSON.
 #[derive(serde::Serialize)]
-struct Told<'a> {
-    verdict: String,
+pub(crate) struct Told<'a> {
+    pub verdict: String,
     #[serde(flatten)]
-    fit: &'a Fit,
+    pub fit: &'a Fit,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    circular_tests: &'a [CircularTest],
+    pub circular_tests: &'a [CircularTest],
+}
+
+/// Calibrates, and refuses what is nonsense; with `force` that is a note.
+pub(crate) fn judged(
+    machine: &Machine,
+    recordings: &[Recording],
+    (model, options): (&ErrorModel, CalibrateOptions),
+    force: bool,
+    progress: &dyn Fn(&str),
+) -> Outcome<(CalibratedMachine, Fit, Option<String>)> {
+    let (calibrated, mut fit) = calibrate_model(machine, recordings, model, options, progress)?;
+    fit.warnings.extend(verdict::of_recordings(machine, recordings, force, progress)?);
+    let note = verdict::of_fit(machine, recordings, &fit, force, progress)?;
+    Ok((calibrated, fit, note))
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
     let progress = args.common.progress();
-    let found = calibrate_model(&machine, &recordings, &args.model(&machine)?, args.options(), &|text| {
-        progress.say(text)
-    });
-    let (calibrated, mut fit) = found?;
-    let notes = verdict::of_recordings(&machine, &recordings, args.force, &|text| progress.say(text))?;
-    fit.warnings.extend(notes);
-    let note = verdict::of_fit(&machine, &recordings, &fit, args.force, &|text| progress.say(text))?;
+    let model = args.model(&machine)?;
+    let (calibrated, fit, note) =
+        judged(&machine, &recordings, (&model, args.options()), args.force, &|text| progress.say(text))?;
     let mut text = render(&fit, args.all);
     if let Some(note) = &note {
         let _ = writeln!(text, "note: {note}");

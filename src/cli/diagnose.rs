@@ -3,12 +3,14 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
+use crate::calibration::CalibratedMachine;
 use crate::circular::{CircularTest, circular_tests};
 use crate::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use crate::effects::Library;
 use crate::feature::as_seen_in;
 use crate::identify::{calibrate, declared};
 use crate::machine::Machine;
+use crate::recording::Recording;
 
 use super::Common;
 use super::files::Output;
@@ -53,6 +55,24 @@ pub(crate) struct Told<'a> {
     pub circular_tests: &'a [CircularTest],
 }
 
+/// Diagnoses, and models what was found if the model is `wanted` or has more than geometry; nonsense is refused, with `force` it is a note.
+pub(crate) fn judged(
+    machine: &Machine,
+    recordings: &[Recording],
+    library: &Library,
+    (wanted, force): (bool, bool),
+    progress: &dyn Fn(&str),
+) -> Outcome<(Diagnosis, Option<CalibratedMachine>, Option<String>)> {
+    let request = DiagnoseOptions::default();
+    let note = verdict::beforehand(machine, recordings, force, progress)?;
+    let mut found = diagnose(machine, recordings, library, &request, progress)?;
+    let model = match wanted || found.has_more_than_geometry() {
+        true => Some(found.model(machine, recordings, request.options, progress)?),
+        false => None,
+    };
+    Ok((found, model, note))
+}
+
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
@@ -68,21 +88,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
         }
     }
     let progress = args.common.progress();
-    let request = DiagnoseOptions::default();
-    let note = verdict::beforehand(&machine, &recordings, args.force, &|text| progress.say(text))?;
-    let found = diagnose(&machine, &recordings, &library, &request, &|text| progress.say(text)).and_then(
-        |mut found| {
-            let wanted = args.output.is_some() || found.has_more_than_geometry();
-            let model = match wanted {
-                true => {
-                    Some(found.model(&machine, &recordings, request.options, &|text| progress.say(text))?)
-                }
-                false => None,
-            };
-            Ok((found, model))
-        },
-    );
-    let (diagnosis, model) = found?;
+    let (diagnosis, model, note) =
+        judged(&machine, &recordings, &library, (args.output.is_some(), args.force), &|text| {
+            progress.say(text)
+        })?;
     let mut notes: Vec<String> = note.into_iter().collect();
     for recording in &recordings {
         notes.extend(recording.warnings().iter().map(|w| format!("{}: {w}", recording.name())));
@@ -102,7 +111,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         Some(_) => {
             progress.say("drawing the report");
             let seen = as_seen_in(&machine, &recordings);
-            let (geometry, fit) = calibrate(&seen, &recordings, request.options)?;
+            let (geometry, fit) = calibrate(&seen, &recordings, DiagnoseOptions::default().options)?;
             let mut sources = vec![Source::of("machine", &args.machine)];
             sources.extend(args.recordings.iter().map(|path| Source::of("recording", path)));
             sources.extend(args.effects.iter().map(|path| Source::of("effects", path)));

@@ -24,9 +24,11 @@ fn same(shown: &str, printed: &str) -> bool {
     let (shown, printed) = (words(shown), words(printed));
     (0..shown.len()).all(|i| {
         let beside = |j: Option<usize>, of: &[&str]| {
-            j.and_then(|j| shown.get(j)).is_some_and(|w| of.contains(&w.as_str()))
+            let word = j.and_then(|j| shown.get(j)).map(|w| w.trim_end_matches([',', ';', '.']));
+            word.is_some_and(|w| of.contains(&w))
         };
-        let measured = beside(i.checked_sub(1), &["±"]) || beside(Some(i + 1), &["±", "%", "um", "urad"]);
+        let measured =
+            beside(i.checked_sub(1), &["±"]) || beside(Some(i + 1), &["±", "%", "um", "mm", "urad", "um/m"]);
         match (measured, shown[i].parse::<f64>(), printed[i].parse::<f64>()) {
             (true, Ok(a), Ok(b)) => {
                 let decimals = shown[i].split_once('.').map_or(0, |(_, behind)| behind.len() as i32);
@@ -38,7 +40,7 @@ fn same(shown: &str, printed: &str) -> bool {
 }
 
 /// Says where `shown` is not in `printed`, line by line; a line `...` stands for any lines left out.
-fn compare(shown: &[String], printed: &[&str]) -> Result<(), String> {
+pub fn compare(shown: &[String], printed: &[&str]) -> Result<(), String> {
     let mut at = 0;
     for run in shown.split(|line| line.trim() == "...") {
         // Blank lines next to `...` belong to the document.

@@ -10,6 +10,7 @@ mod diagnose;
 mod docs_convert;
 mod docs_effects;
 mod docs_equations;
+mod docs_measure;
 mod docs_recordings;
 mod documents;
 mod export;
