@@ -1,11 +1,14 @@
-//! Machines from files that describe robots in other forms: URDF.
+//! Machines from files that describe them in other forms: URDF, Denavit-Hartenberg tables.
 //!
-//! [`read`] makes a machine file of the chain between two links, in m and rad as URDF has them. Joints that are fixed become part of the
-//! next joint's initial pose. Frames and joints bear the joints' names. `docs/import.md` says what is understood.
+//! [`read`] makes a machine file of the chain between two links of a robot, or of all joints of a table, in the units of the description.
+//! Joints that are fixed become part of the next joint's initial pose. Frames and joints bear the joints' names. `docs/import.md` says
+//! what is understood.
 
 mod chain;
+mod dh;
 mod names;
 mod origins;
+mod sheet;
 mod step;
 mod urdf;
 mod write;
@@ -18,6 +21,18 @@ use crate::machine::Machine;
 
 pub(crate) use origins::{Edit, Held, origins};
 
+/// The form of a description.
+#[non_exhaustive]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// URDF.
+    Urdf,
+    /// A table of Denavit-Hartenberg parameters, standard convention.
+    Dh,
+    /// The same, modified convention (Craig).
+    Mdh,
+}
+
 /// Which part of a description becomes the machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ends {
@@ -25,6 +40,22 @@ pub struct Ends {
     pub base: Option<String>,
     /// Link that is the tool frame `t`; the only end of a chain where nothing is said.
     pub tip: Option<String>,
+}
+
+/// What is known of a description besides what it says itself.
+#[non_exhaustive]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ImportOptions {
+    /// Its form; found from the text where nothing is said.
+    pub form: Option<Form>,
+    /// Which part of it becomes the machine, where its links have names.
+    pub ends: Ends,
+}
+
+impl From<Ends> for ImportOptions {
+    fn from(ends: Ends) -> Self {
+        ImportOptions { ends, ..ImportOptions::default() }
+    }
 }
 
 /// A machine that was read from a foreign description.
@@ -39,18 +70,26 @@ pub struct Imported {
     pub told: Vec<String>,
 }
 
-/// Reads the URDF file at `path`.
+/// Reads the description at `path`, of whatever form it is.
 ///
 /// # Errors
 /// [`Error::File`], or [`Error::Input`] with the line at fault.
 pub fn open(path: impl AsRef<Path>, ends: &Ends) -> Result<Imported> {
+    open_with(path, &ends.clone().into())
+}
+
+/// The same with what is known of it besides.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_with(path: impl AsRef<Path>, options: &ImportOptions) -> Result<Imported> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|source| Error::file(path, source))?;
     // Descriptions in old encodings have their odd letters in comments; a name that has one is mapped and told.
-    read(path, &String::from_utf8_lossy(&bytes), ends)
+    read_with(path, &String::from_utf8_lossy(&bytes), options)
 }
 
-/// Reads a URDF text; `file` is only the name that messages use.
+/// Reads a description; `file` is only the name that messages use.
 ///
 /// ```
 /// use kincal::import::{Ends, read};
@@ -67,9 +106,55 @@ pub fn open(path: impl AsRef<Path>, ends: &Ends) -> Result<Imported> {
 /// # Errors
 /// [`Error::Input`] with the line at fault.
 pub fn read(file: impl AsRef<Path>, text: &str, ends: &Ends) -> Result<Imported> {
+    read_with(file, text, &ends.clone().into())
+}
+
+/// The same with what is known of it besides.
+///
+/// ```
+/// use kincal::import::{Form, ImportOptions, read_with};
+///
+/// let mut options = ImportOptions::default();
+/// options.form = Some(Form::Dh);
+/// let arm = read_with("scara.csv", "joint,kind,theta[deg],d[mm],a[mm],alpha[deg]\n\
+///     shoulder,revolute,0,387,325,0\n\
+///     elbow,revolute,0,0,275,180\n\
+///     quill,prismatic,0,0,0,0\n", &options)?;
+/// assert_eq!(arm.machine.commands(), ["shoulder", "elbow", "quill"]);
+/// # Ok::<(), kincal::Error>(())
+/// ```
+///
+/// # Errors
+/// As [`read`].
+pub fn read_with(file: impl AsRef<Path>, text: &str, options: &ImportOptions) -> Result<Imported> {
     let file = file.as_ref();
-    let robot = urdf::read(file, text)?;
-    machine_of(file, chain::cut(&robot, ends)?)
+    let has_ends = options.ends != Ends::default();
+    let form = options.form.map_or_else(|| form_of(file, text), Ok)?;
+    let chain = match form {
+        Form::Urdf => chain::cut(&urdf::read(file, text)?, &options.ends)?,
+        Form::Dh | Form::Mdh if has_ends => {
+            let what = "--base and --tip name links, which a DH table has not";
+            let mend = "write `# base[m,rad]: x,y,z,rx,ry,rz` and `# tool[m,rad]: ...` into the table";
+            return Err(Error::mistake(Place::file(file), what, mend));
+        }
+        Form::Dh | Form::Mdh => dh::read(file, text, options.form)?,
+    };
+    machine_of(file, chain)
+}
+
+/// The form that a text looks like.
+fn form_of(file: &Path, text: &str) -> Result<Form> {
+    let start = text.trim_start_matches('\u{feff}').trim_start();
+    if start.is_empty() || start.starts_with('<') {
+        Ok(Form::Urdf)
+    } else if dh::is_table(text) {
+        // Either convention: the table says which.
+        Ok(Form::Dh)
+    } else {
+        let what = "this is neither XML nor a table with a column `alpha`";
+        let mend = "name a URDF file or a table of Denavit-Hartenberg parameters";
+        Err(Error::mistake(Place::file(file), what, mend))
+    }
 }
 
 /// The machine that a chain is.
@@ -81,8 +166,7 @@ fn machine_of(file: &Path, chain: chain::Chain) -> Result<Imported> {
             Error::Input { fault, .. } => fault.to_string(),
             other => other.to_string(),
         };
-        let mend =
-            format!("choose other links by --base and --tip, or mend the description ({})", error.mend());
+        let mend = format!("mend the description, or choose other ends of the chain ({})", error.mend());
         Error::mistake(Place::file(file), format!("the chain makes no machine: {why}"), mend)
     })?;
     Ok(Imported { machine, text, told: chain.told })

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::import::{Ends, open};
+use crate::import::{Ends, Form, ImportOptions, open_with};
 use serde_json::json;
 
 use super::Common;
@@ -11,9 +11,15 @@ use super::output::{Outcome, count, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// URDF file; xacro is expanded first
-    #[arg(value_name = "ROBOT.urdf")]
+    /// Description of a machine: URDF (xacro is expanded first), a DH table
+    #[arg(value_name = "FILE")]
     file: PathBuf,
+    /// FILE is a table of Denavit-Hartenberg parameters, standard convention
+    #[arg(long, group = "form")]
+    dh: bool,
+    /// The same, modified convention (Craig)
+    #[arg(long, group = "form")]
+    mdh: bool,
     /// Link that carries the workpiece; the root where nothing is said
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
@@ -28,7 +34,10 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let imported = open(&args.file, &Ends { base: args.base.clone(), tip: args.tip.clone() })?;
+    let mut options = ImportOptions::from(Ends { base: args.base.clone(), tip: args.tip.clone() });
+    let forms = [(args.dh, Form::Dh), (args.mdh, Form::Mdh)];
+    options.form = forms.into_iter().find(|(asked, _)| *asked).map(|(_, form)| form);
+    let imported = open_with(&args.file, &options)?;
     write_whole(&args.output, |out| {
         // Watched: an error here is told of the output.
         let _ = out.write_all(imported.text.as_bytes());

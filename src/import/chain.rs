@@ -5,7 +5,7 @@ use super::names::{Names, usable};
 use super::step::{Mass, Mimic, Motion, Move, Robot, Step};
 use crate::error::{Error, Result};
 use crate::lie::{Pose, Twist, Vec3};
-use crate::machine::JointKind;
+use crate::machine::{FileUnits, JointKind};
 
 /// One entry of a machine file.
 pub(super) struct Entry {
@@ -26,12 +26,15 @@ pub(super) struct JointEntry {
     pub kind: JointKind,
     pub axis: Vec3<f64>,
     pub travel: Option<(f64, f64)>,
-    pub follows: Option<(String, f64)>,
+    /// Leaders with their factors; nothing where the joint has a command of its own alone.
+    pub follows: Vec<(String, f64)>,
 }
 
 pub(super) struct Chain {
     pub name: String,
     pub about: String,
+    /// Units of the machine file.
+    pub units: FileUnits,
     pub workpiece: Vec<Entry>,
     pub tool: Vec<Entry>,
     pub told: Vec<String>,
@@ -84,7 +87,8 @@ pub(super) fn cut(robot: &Robot, ends: &Ends) -> Result<Chain> {
         one_line(&robot.links[base].name),
         one_line(&robot.links[tip].name)
     );
-    Ok(Chain { name: usable(&robot.name, "robot_"), about, workpiece, tool, told })
+    let units = FileUnits::si();
+    Ok(Chain { name: usable(&robot.name, "robot_"), about, units, workpiece, tool, told })
 }
 
 /// A text of the description where a line must stay one, in quotes or as a comment.
@@ -234,7 +238,7 @@ impl Maker<'_> {
             self.next += 1;
             let (follows, offset) = match mimic {
                 Some(mimic) => self.follow(step, mimic),
-                None => (None, 0.0),
+                None => (Vec::new(), 0.0),
             };
             let twist = match kind {
                 JointKind::Prismatic => Twist::new(axis.times(offset), Vec3([0.0; 3])),
@@ -284,7 +288,7 @@ impl Maker<'_> {
     }
 
     /// What a mimic joint follows in the chain, and by what offset. Leaders that follow others are followed to the first.
-    fn follow(&mut self, step: &Step, mimic: &Mimic) -> (Option<(String, f64)>, f64) {
+    fn follow(&mut self, step: &Step, mimic: &Mimic) -> (Vec<(String, f64)>, f64) {
         let mut total = mimic.clone();
         for _ in 0..self.robot.steps.len() {
             let leader = self.robot.steps.iter().find(|s| s.name == total.leader);
@@ -295,13 +299,13 @@ impl Maker<'_> {
         }
         let name = one_line(&step.name);
         match self.given.iter().find(|(own, _)| *own == total.leader && *own != step.name) {
-            Some((_, given)) => (Some((given.clone(), total.factor)), total.offset),
+            Some((_, given)) => (vec![(given.clone(), total.factor)], total.offset),
             None => {
                 let leader = one_line(&total.leader);
                 self.told.push(format!(
                     "joint \"{name}\" follows \"{leader}\", which is not in the chain: it has a command of its own"
                 ));
-                (None, 0.0)
+                (Vec::new(), 0.0)
             }
         }
     }

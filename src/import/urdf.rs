@@ -25,7 +25,7 @@ pub(super) fn read(file: &Path, text: &str) -> Result<Robot> {
     }
     if root.tag_name().name() != "robot" {
         let what = format!("the file begins with <{}>, URDF with <robot>", root.tag_name().name());
-        return Err(source.fault(root, what, "name a URDF file; MJCF, SDF and DH tables are not read yet"));
+        return Err(source.fault(root, what, "name a URDF file; SDF is not read"));
     }
     let mut robot = Robot {
         file: file.to_path_buf(),

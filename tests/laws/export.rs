@@ -163,6 +163,34 @@ fn a_chain_rebuilt_from_its_dh_table_is_the_same_machine() {
     assert!(second_turns > 20, "{second_turns}");
 }
 
+#[test]
+fn a_dh_table_read_back_is_the_same_machine() {
+    let mut rng = StdRng::seed_from_u64(13);
+    for calibrated in machines() {
+        let machine = calibrated.machine();
+        for format in [Format::Dh, Format::Mdh] {
+            let text = export(&calibrated, format, &ExportOptions::default()).expect("a table").text;
+            let back = read("back.csv", &text, &Ends::default()).expect("sound").machine;
+            assert_eq!(back.name(), machine.name());
+            for _ in 0..20 {
+                let q = commands(machine, &mut rng);
+                // Joints that carry the workpiece stand first, the outermost first: the order of commands differs.
+                let of = |name: &String| {
+                    q[machine.commands().iter().position(|own| own == name).expect("a command")]
+                };
+                let theirs: Vec<f64> = back.commands().iter().map(of).collect();
+                assert_eq!(theirs.len(), q.len());
+                let gap = gap(calibrated.chain().w_from_t(&q), Chain::nominal(&back).w_from_t(&theirs));
+                assert!(gap < 1e-12, "{} {format}: {gap:e}", machine.name());
+            }
+            for (_, joint) in machine.joints() {
+                let own = back.joints().find(|(_, own)| own.name == joint.name).expect("a joint").1;
+                assert_eq!((own.kind, own.travel), (joint.kind, joint.travel));
+            }
+        }
+    }
+}
+
 /// A lift with a position error and play, as `diagnose` would write them.
 fn lift() -> CalibratedMachine {
     CalibratedMachine::open(folder("tests/exports/lift.ron")).expect("sound")

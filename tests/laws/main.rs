@@ -19,6 +19,7 @@ mod export;
 mod export_controls;
 mod features;
 mod import;
+mod import_dh;
 mod interface;
 mod inverse;
 mod jacobians;
