@@ -129,7 +129,7 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Compensate(args) => compensate::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Simulate(args) => simulate::run(args, files),
-        Command::Import(args) => import::run(args),
+        Command::Import(args) => import::run(args, files),
         Command::Convert(args) => convert::run(args, files),
         Command::Export(args) => export::run(args),
         Command::Machines(args) => machines::run(args),

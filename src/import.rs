@@ -1,11 +1,12 @@
-//! Machines from files that describe them in other forms: URDF, Denavit-Hartenberg tables.
+//! Machines from files that describe them in other forms: URDF, MJCF, Denavit-Hartenberg tables.
 //!
-//! [`read`] makes a machine file of the chain between two links of a robot, or of all joints of a table, in the units of the description.
+//! [`read`] makes a machine file of the chain between two links or bodies of a robot, or of all joints of a table, in the units of the description.
 //! Joints that are fixed become part of the next joint's initial pose. Frames and joints bear the joints' names. `docs/import.md` says
 //! what is understood.
 
 mod chain;
 mod dh;
+mod mjcf;
 mod names;
 mod origins;
 mod sheet;
@@ -14,7 +15,7 @@ mod urdf;
 mod write;
 mod xml;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
@@ -27,6 +28,8 @@ pub(crate) use origins::{Edit, Held, origins};
 pub enum Form {
     /// URDF.
     Urdf,
+    /// MJCF, the models of MuJoCo.
+    Mjcf,
     /// A table of Denavit-Hartenberg parameters, standard convention.
     Dh,
     /// The same, modified convention (Craig).
@@ -36,9 +39,9 @@ pub enum Form {
 /// Which part of a description becomes the machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ends {
-    /// Link that carries the workpiece frame `w`; the root where nothing is said.
+    /// Link or body that carries the workpiece frame `w`; the root where nothing is said.
     pub base: Option<String>,
-    /// Link that is the tool frame `t`; the only end of a chain where nothing is said.
+    /// Link, body or site that is the tool frame `t`; the only end of a chain where nothing is said.
     pub tip: Option<String>,
 }
 
@@ -50,6 +53,17 @@ pub struct ImportOptions {
     pub form: Option<Form>,
     /// Which part of it becomes the machine, where its links have names.
     pub ends: Ends,
+    /// Texts of files that the description names; [`open_with`] reads those that are not here.
+    pub beside: Vec<Beside>,
+}
+
+/// A file beside a description.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Beside {
+    /// Its path, as the description leads to it.
+    pub file: PathBuf,
+    /// Its text.
+    pub text: String,
 }
 
 impl From<Ends> for ImportOptions {
@@ -68,6 +82,8 @@ pub struct Imported {
     pub text: String,
     /// What was guessed, mapped or left out, one sentence each.
     pub told: Vec<String>,
+    /// Files that were read besides, as the description leads to them.
+    pub beside: Vec<PathBuf>,
 }
 
 /// Reads the description at `path`, of whatever form it is.
@@ -85,8 +101,15 @@ pub fn open(path: impl AsRef<Path>, ends: &Ends) -> Result<Imported> {
 pub fn open_with(path: impl AsRef<Path>, options: &ImportOptions) -> Result<Imported> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|source| Error::file(path, source))?;
-    // Descriptions in old encodings have their odd letters in comments; a name that has one is mapped and told.
-    read_with(path, &String::from_utf8_lossy(&bytes), options)
+    imported(path, &text_of(&bytes), options, &|file| {
+        let bytes = std::fs::read(file).map_err(|source| Error::file(file, source))?;
+        Ok(text_of(&bytes))
+    })
+}
+
+/// Descriptions in old encodings have their odd letters in comments; a name that has one is mapped and told.
+fn text_of(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// Reads a description; `file` is only the name that messages use.
@@ -127,11 +150,26 @@ pub fn read(file: impl AsRef<Path>, text: &str, ends: &Ends) -> Result<Imported>
 /// # Errors
 /// As [`read`].
 pub fn read_with(file: impl AsRef<Path>, text: &str, options: &ImportOptions) -> Result<Imported> {
-    let file = file.as_ref();
+    imported(file.as_ref(), text, options, &|file| {
+        Err(Error::file(file, std::io::Error::from(std::io::ErrorKind::NotFound)))
+    })
+}
+
+fn imported(file: &Path, text: &str, options: &ImportOptions, files: mjcf::Reader) -> Result<Imported> {
+    let given = |file: &Path| match options.beside.iter().find(|beside| beside.file == file) {
+        Some(beside) => Ok(beside.text.clone()),
+        None => files(file),
+    };
     let has_ends = options.ends != Ends::default();
     let form = options.form.map_or_else(|| form_of(file, text), Ok)?;
+    let read = std::cell::RefCell::new(Vec::new());
+    let given = |beside: &Path| {
+        read.borrow_mut().push(beside.to_path_buf());
+        given(beside)
+    };
     let chain = match form {
         Form::Urdf => chain::cut(&urdf::read(file, text)?, &options.ends)?,
+        Form::Mjcf => chain::cut(&mjcf::read(file, text, &given)?, &options.ends)?,
         Form::Dh | Form::Mdh if has_ends => {
             let what = "--base and --tip name links, which a DH table has not";
             let mend = "write `# base[m,rad]: x,y,z,rx,ry,rz` and `# tool[m,rad]: ...` into the table";
@@ -139,20 +177,21 @@ pub fn read_with(file: impl AsRef<Path>, text: &str, options: &ImportOptions) ->
         }
         Form::Dh | Form::Mdh => dh::read(file, text, options.form)?,
     };
-    machine_of(file, chain)
+    Ok(Imported { beside: read.take(), ..machine_of(file, chain)? })
 }
 
 /// The form that a text looks like.
 fn form_of(file: &Path, text: &str) -> Result<Form> {
     let start = text.trim_start_matches('\u{feff}').trim_start();
     if start.is_empty() || start.starts_with('<') {
-        Ok(Form::Urdf)
+        let is_model = ["mujoco", "mujocoinclude"].into_iter().any(|name| xml::is_root(start, name));
+        Ok(if is_model { Form::Mjcf } else { Form::Urdf })
     } else if dh::is_table(text) {
         // Either convention: the table says which.
         Ok(Form::Dh)
     } else {
         let what = "this is neither XML nor a table with a column `alpha`";
-        let mend = "name a URDF file or a table of Denavit-Hartenberg parameters";
+        let mend = "name a URDF or MJCF file, or a table of Denavit-Hartenberg parameters";
         Err(Error::mistake(Place::file(file), what, mend))
     }
 }
@@ -169,5 +208,5 @@ fn machine_of(file: &Path, chain: chain::Chain) -> Result<Imported> {
         let mend = format!("mend the description, or choose other ends of the chain ({})", error.mend());
         Error::mistake(Place::file(file), format!("the chain makes no machine: {why}"), mend)
     })?;
-    Ok(Imported { machine, text, told: chain.told })
+    Ok(Imported { machine, text, told: chain.told, beside: Vec::new() })
 }

@@ -6,24 +6,27 @@ use crate::import::{Ends, Form, ImportOptions, open_with};
 use serde_json::json;
 
 use super::Common;
-use super::files::Output;
+use super::files::{Files, Output};
 use super::output::{Outcome, count, write_whole};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Description of a machine: URDF (xacro is expanded first), a DH table
+    /// Description of a machine: URDF (xacro is expanded first), MJCF, a DH table
     #[arg(value_name = "FILE")]
     file: PathBuf,
+    /// FILE is a model of MuJoCo
+    #[arg(long, group = "form")]
+    mjcf: bool,
     /// FILE is a table of Denavit-Hartenberg parameters, standard convention
     #[arg(long, group = "form")]
     dh: bool,
     /// The same, modified convention (Craig)
     #[arg(long, group = "form")]
     mdh: bool,
-    /// Link that carries the workpiece; the root where nothing is said
+    /// Link or body that carries the workpiece; the root where nothing is said
     #[arg(long, value_name = "LINK")]
     base: Option<String>,
-    /// Link that is the tool; the only end where nothing is said
+    /// Link, body or site that is the tool; the only end where nothing is said
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
     /// Where to write the machine file
@@ -33,11 +36,12 @@ pub(crate) struct Args {
     common: Common,
 }
 
-pub(crate) fn run(args: &Args) -> Outcome {
+pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
     let mut options = ImportOptions::from(Ends { base: args.base.clone(), tip: args.tip.clone() });
-    let forms = [(args.dh, Form::Dh), (args.mdh, Form::Mdh)];
+    let forms = [(args.mjcf, Form::Mjcf), (args.dh, Form::Dh), (args.mdh, Form::Mdh)];
     options.form = forms.into_iter().find(|(asked, _)| *asked).map(|(_, form)| form);
     let imported = open_with(&args.file, &options)?;
+    files.with_inputs("FILE", &imported.beside).check()?;
     write_whole(&args.output, |out| {
         // Watched: an error here is told of the output.
         let _ = out.write_all(imported.text.as_bytes());

@@ -45,21 +45,13 @@ struct Link {
 impl Link {
     /// Along and about the joint's own axis.
     fn own(&self) -> [Move; 2] {
-        [turn(2, self.theta), shift(2, self.d)]
+        [Move::Turn(2, self.theta), Move::Shift(2, self.d)]
     }
 
     /// From its axis to the next one, or from the one before in the modified convention.
     fn link(&self) -> [Move; 3] {
-        [shift(0, self.a), turn(0, self.alpha), turn(1, self.beta)]
+        [Move::Shift(0, self.a), Move::Turn(0, self.alpha), Move::Turn(1, self.beta)]
     }
-}
-
-fn turn(axis: usize, by: f64) -> Move {
-    Move { turn: true, axis, by }
-}
-
-fn shift(axis: usize, by: f64) -> Move {
-    Move { turn: false, axis, by }
 }
 
 pub(super) fn read(file: &Path, text: &str, form: Option<Form>) -> Result<Chain> {
@@ -135,9 +127,9 @@ fn entry(
     joint: Option<JointEntry>,
     line: usize,
 ) -> Entry {
-    let moves: Vec<Move> = moves.into_iter().filter(|m| m.by != 0.0).collect();
+    let moves: Vec<Move> = moves.into_iter().filter(|m| !m.is_none()).collect();
     let (moves, offset) = match before {
-        Some(pose) => (Vec::new(), Some(moves.iter().fold(pose, |pose, m| pose * m.pose()))),
+        Some(pose) => (Vec::new(), Some(pose * Move::all(&moves))),
         None => (moves, None),
     };
     let note = format!("line {line}");

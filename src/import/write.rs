@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::chain::{Chain, Entry, JointEntry, one_line};
+use super::step::Move;
 use crate::lie::{Pose, Vec3};
 use crate::machine::{FileUnits, JointKind};
 use crate::units::Unit;
@@ -36,23 +37,36 @@ pub(super) fn ron(file: &Path, chain: &Chain) -> String {
 
 fn entry(entry: &Entry, units: FileUnits) -> String {
     let mut text = format!("(frame: \"{}\"", entry.frame);
-    if let Some(offset) = entry.offset {
-        let pose = entry.moves.iter().fold(Pose::identity(0.0), |pose, m| pose * m.pose()) * offset;
-        let (at, turn) = (pose.translation, pose.rotation_vector());
-        let _ = write!(text, ", at: {}, rotation: {}", triple(at, units.length), triple(turn, units.angle));
-    } else if entry.moves.iter().all(|m| !m.turn) {
-        let mut at = Vec3([0.0; 3]);
-        entry.moves.iter().for_each(|m| at.0[m.axis] += m.by);
-        if at.0 != [0.0; 3] {
-            let _ = write!(text, ", at: {}", triple(at, units.length));
+    let elementary = |m: &Move| match *m {
+        Move::Turn(axis, by) => Some(("R", axis, units.angle, by)),
+        Move::Shift(axis, by) => Some(("T", axis, units.length, by)),
+        Move::Pose(_) => None,
+    };
+    let moves: Option<Vec<_>> = entry.moves.iter().map(elementary).collect();
+    match moves.filter(|_| entry.offset.is_none()) {
+        None => {
+            let pose = Move::all(&entry.moves) * entry.offset.unwrap_or(Pose::identity(0.0));
+            let (at, turn) = (pose.translation, pose.rotation_vector());
+            if at.0 != [0.0; 3] {
+                let _ = write!(text, ", at: {}", triple(at, units.length));
+            }
+            if turn.0 != [0.0; 3] {
+                let _ = write!(text, ", rotation: {}", triple(turn, units.angle));
+            }
         }
-    } else {
-        let word = |turn| if turn { 'R' } else { 'T' };
-        let unit = |turn| if turn { units.angle } else { units.length };
-        let moves = entry.moves.iter().map(|m| {
-            format!("{}{}({})", word(m.turn), ["x", "y", "z"][m.axis], number(unit(m.turn).write_si(m.by)))
-        });
-        let _ = write!(text, ", moves: [{}]", moves.collect::<Vec<_>>().join(", "));
+        Some(moves) if moves.iter().all(|(word, ..)| *word == "T") => {
+            let mut at = Vec3([0.0; 3]);
+            moves.iter().for_each(|(_, axis, _, by)| at.0[*axis] += by);
+            if at.0 != [0.0; 3] {
+                let _ = write!(text, ", at: {}", triple(at, units.length));
+            }
+        }
+        Some(moves) => {
+            let moves = moves.iter().map(|(word, axis, unit, by)| {
+                format!("{word}{}({})", ["x", "y", "z"][*axis], number(unit.write_si(*by)))
+            });
+            let _ = write!(text, ", moves: [{}]", moves.collect::<Vec<_>>().join(", "));
+        }
     }
     if let Some(joint) = &entry.joint {
         let _ = write!(text, ", joint: {}", joint_text(joint, units));
