@@ -1,11 +1,12 @@
-//! Machines from files that describe them in other forms: URDF, MJCF, Denavit-Hartenberg tables.
+//! Machines from files that describe them in other forms: URDF, MJCF, Denavit-Hartenberg tables, configurations of LinuxCNC.
 //!
-//! [`read`] makes a machine file of the chain between two links or bodies of a robot, or of all joints of a table, in the units of the description.
-//! Joints that are fixed become part of the next joint's initial pose. Frames and joints bear the joints' names. `docs/import.md` says
-//! what is understood.
+//! [`read`] makes a machine file of the chain between two links or bodies of a robot, or of all joints of a table or a control, in the
+//! units of the description. Joints that are fixed become part of the next joint's initial pose. Frames and joints bear the joints' names.
+//! `docs/import.md` says what is understood.
 
 mod chain;
 mod dh;
+mod linuxcnc;
 mod mjcf;
 mod names;
 mod origins;
@@ -34,6 +35,8 @@ pub enum Form {
     Dh,
     /// The same, modified convention (Craig).
     Mdh,
+    /// The INI file of a machine that LinuxCNC runs.
+    LinuxCnc,
 }
 
 /// Which part of a description becomes the machine.
@@ -47,12 +50,16 @@ pub struct Ends {
 
 /// What is known of a description besides what it says itself.
 #[non_exhaustive]
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImportOptions {
     /// Its form; found from the text where nothing is said.
     pub form: Option<Form>,
     /// Which part of it becomes the machine, where its links have names.
     pub ends: Ends,
+    /// HAL files of a [`Form::LinuxCnc`] machine, besides those that its INI file names.
+    pub hal: Vec<PathBuf>,
+    /// Length of the tool that frame `t` of such a machine is the tip of, from the gauge line of the spindle, m.
+    pub tool_length: f64,
     /// Texts of files that the description names; [`open_with`] reads those that are not here.
     pub beside: Vec<Beside>,
 }
@@ -155,7 +162,10 @@ pub fn read_with(file: impl AsRef<Path>, text: &str, options: &ImportOptions) ->
     })
 }
 
-fn imported(file: &Path, text: &str, options: &ImportOptions, files: mjcf::Reader) -> Result<Imported> {
+/// Reads a file that a description names.
+type Reader<'a> = &'a dyn Fn(&Path) -> Result<String>;
+
+fn imported(file: &Path, text: &str, options: &ImportOptions, files: Reader) -> Result<Imported> {
     let given = |file: &Path| match options.beside.iter().find(|beside| beside.file == file) {
         Some(beside) => Ok(beside.text.clone()),
         None => files(file),
@@ -175,6 +185,12 @@ fn imported(file: &Path, text: &str, options: &ImportOptions, files: mjcf::Reade
             let mend = "write `# base[m,rad]: x,y,z,rx,ry,rz` and `# tool[m,rad]: ...` into the table";
             return Err(Error::mistake(Place::file(file), what, mend));
         }
+        Form::LinuxCnc if has_ends => {
+            let what = "--base and --tip name links, which a machine of LinuxCNC has not";
+            let mend = "leave them out; --tool-length says where the tip is";
+            return Err(Error::mistake(Place::file(file), what, mend));
+        }
+        Form::LinuxCnc => linuxcnc::read(file, text, &options.hal, options.tool_length, &given)?,
         Form::Dh | Form::Mdh => dh::read(file, text, options.form)?,
     };
     Ok(Imported { beside: read.take(), ..machine_of(file, chain)? })
@@ -186,12 +202,15 @@ fn form_of(file: &Path, text: &str) -> Result<Form> {
     if start.is_empty() || start.starts_with('<') {
         let is_model = ["mujoco", "mujocoinclude"].into_iter().any(|name| xml::is_root(start, name));
         Ok(if is_model { Form::Mjcf } else { Form::Urdf })
+    } else if linuxcnc::is_ini(text) {
+        Ok(Form::LinuxCnc)
     } else if dh::is_table(text) {
         // Either convention: the table says which.
         Ok(Form::Dh)
     } else {
-        let what = "this is neither XML nor a table with a column `alpha`";
-        let mend = "name a URDF or MJCF file, or a table of Denavit-Hartenberg parameters";
+        let what =
+            "this is neither XML, nor a table with a column `alpha`, nor an INI file with a section [KINS]";
+        let mend = "name a URDF or MJCF file, a table of Denavit-Hartenberg parameters, or the INI file of a LinuxCNC machine";
         Err(Error::mistake(Place::file(file), what, mend))
     }
 }

@@ -28,6 +28,8 @@ pub(super) struct JointEntry {
     pub travel: Option<(f64, f64)>,
     /// Leaders with their factors; nothing where the joint has a command of its own alone.
     pub follows: Vec<(String, f64)>,
+    /// Address in NC programs, where it is not the name in capitals.
+    pub nc: Option<String>,
 }
 
 pub(super) struct Chain {
@@ -251,7 +253,7 @@ impl Maker<'_> {
                 frame,
                 moves: std::mem::take(&mut moves),
                 offset: (offset != 0.0).then(|| Pose::exp(twist)),
-                joint: Some(JointEntry { kind, axis, travel, follows }),
+                joint: Some(JointEntry { kind, axis, travel, follows, nc: None }),
                 mass: None,
                 steps: std::mem::take(&mut passed),
                 note: std::mem::take(&mut notes).join(", "),

@@ -90,6 +90,7 @@ pub(super) fn read(file: &Path, text: &str, form: Option<Form>) -> Result<Chain>
             kind: link.kind,
             axis,
             travel: link.travel,
+            nc: None,
             follows: link.follows.iter().map(|term| (term.name.clone(), term.factor)).collect(),
         };
         entries.push(entry(&link.name, before.take(), std::mem::take(&mut moves), Some(joint), link.line));

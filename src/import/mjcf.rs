@@ -10,6 +10,7 @@ use std::path::Path;
 
 use roxmltree::Node;
 
+use super::Reader;
 use super::step::{Link, Mass, Motion, Move, Robot, Step};
 use super::xml::{Source, child};
 use crate::error::{Error, Result};
@@ -17,8 +18,6 @@ use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::JointKind;
 use defaults::Defaults;
 use settings::Settings;
-
-pub(super) use include::Reader;
 
 /// Elements that make bodies of their own, which are not read.
 const MAKERS: [&str; 4] = ["replicate", "attach", "composite", "flexcomp"];

@@ -102,6 +102,9 @@ fn joint_text(joint: &JointEntry, units: FileUnits) -> String {
             joint.follows.iter().map(|(leader, factor)| format!("\"{leader}\": {}", number(*factor)));
         let _ = write!(text, ", follows: {{{}}}", leaders.collect::<Vec<_>>().join(", "));
     }
+    if let Some(address) = &joint.nc {
+        let _ = write!(text, ", nc: (address: \"{address}\", sign: 1)");
+    }
     text.push(')');
     text
 }

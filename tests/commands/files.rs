@@ -48,7 +48,7 @@ const TABLE: [Row; 17] = [
         &["MACHINE.ron", "--input", "--faults"],
         &["--output", "--nc", "--truth", "--json"],
     ),
-    row("import", &[], &["FILE"], &["--output", "--json"]),
+    row("import", &[], &["FILE", "--hal"], &["--output", "--json"]),
     row("convert", &[], &["FILE", "--machine", "--map"], &["--write-map", "--output", "--json"]),
     row("export", &["--to", "urdf"], &["CALIBRATED.ron", "--base-file"], &["--output", "--json"]),
     row("machines", &[], &[], &["--json"]),

@@ -20,6 +20,7 @@ mod export_controls;
 mod features;
 mod import;
 mod import_dh;
+mod import_linuxcnc;
 mod import_mjcf;
 mod interface;
 mod inverse;

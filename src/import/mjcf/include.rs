@@ -2,12 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use super::super::Reader;
 use super::super::xml::Source;
 use crate::error::{Error, Place, Result};
 use crate::wording::shown;
-
-/// Reads a file that another one names.
-pub(crate) type Reader<'a> = &'a dyn Fn(&Path) -> Result<String>;
 
 pub(super) struct Whole {
     pub text: String,
