@@ -17,6 +17,7 @@ mod join;
 mod location;
 mod machines;
 mod man;
+mod new;
 mod output;
 mod part;
 mod predict;
@@ -64,7 +65,9 @@ enum Command {
     Verify(verify::Args),
     /// Recordings of a machine whose errors are known: standard tests, random poses, NC programs
     Simulate(Box<simulate::Args>),
-    /// A machine file from a URDF file
+    /// A new machine file with comments: a copy of one that comes with the program, a list of joints, or answers to questions
+    New(new::Args),
+    /// A machine file from URDF, MJCF, a DH table or a configuration of LinuxCNC
     Import(import::Args),
     /// A recording from a table of another program: other names, units, separators, forms of rotations
     Convert(Box<convert::Args>),
@@ -129,6 +132,7 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Compensate(args) => compensate::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Simulate(args) => simulate::run(args, files),
+        Command::New(args) => new::run(args),
         Command::Import(args) => import::run(args, files),
         Command::Convert(args) => convert::run(args, files),
         Command::Export(args) => export::run(args),

@@ -4,13 +4,16 @@
 //! units of the description. Joints that are fixed become part of the next joint's initial pose. Frames and joints bear the joints' names.
 //! `docs/import.md` says what is understood.
 
+mod cell;
 mod chain;
 mod dh;
 mod linuxcnc;
 mod mjcf;
 mod names;
 mod origins;
+mod position;
 mod sheet;
+mod sketch;
 mod step;
 mod urdf;
 mod write;
@@ -19,9 +22,12 @@ mod xml;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Place, Result};
-use crate::machine::Machine;
+use crate::machine::{FileUnits, Machine};
 
 pub(crate) use origins::{Edit, Held, origins};
+pub use sketch::{Sketch, SketchJoint};
+#[cfg(feature = "cli")]
+pub(crate) use sketch::{Wrong, branch, direction, limits, named_kind, point, usable_name};
 
 /// The form of a description.
 #[non_exhaustive]
@@ -217,7 +223,16 @@ fn form_of(file: &Path, text: &str) -> Result<Form> {
 
 /// The machine that a chain is.
 fn machine_of(file: &Path, chain: chain::Chain) -> Result<Imported> {
-    let text = write::ron(file, &chain);
+    let name = file.file_name().map_or_else(String::new, |n| chain::one_line(&n.to_string_lossy()));
+    let same = if chain.units == FileUnits::si() { "; m and rad as there" } else { "" };
+    let made =
+        format!("// Made by `kincal import` from {name}{same}. Each frame bears the name of its joint.");
+    machine_as(file, &made, chain)
+}
+
+/// The same with a first line of the file that says where it comes from.
+fn machine_as(file: &Path, made: &str, chain: chain::Chain) -> Result<Imported> {
+    let text = write::ron(made, &chain);
     // What a machine file cannot hold is told by the reader of machine files, of the place in the robot's file.
     let machine = Machine::parse(file, &text).map_err(|error| {
         let why = match &error {

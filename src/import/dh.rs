@@ -1,11 +1,11 @@
 //! Denavit-Hartenberg tables, standard and modified: a row for each joint, the poses of base and tool in comments above.
 
-mod cell;
 mod columns;
 
 use std::path::Path;
 
 use super::Form;
+use super::cell::{self, Term, Value};
 use super::chain::{Chain, Entry, JointEntry, one_line};
 use super::names::{Names, usable};
 use super::sheet::{Row, Sheet};
@@ -14,7 +14,6 @@ use crate::error::Result;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{FileUnits, JointKind};
 use crate::units::{Quantity, Unit};
-use cell::{Term, Value};
 use columns::Columns;
 
 /// Whether a text that is no XML has the headings of such a table.
@@ -240,7 +239,7 @@ fn link(sheet: &Sheet, columns: &Columns, row: &Row, name: &str, names: &[String
         travel: columns.travel(sheet, row, kind)?,
         follows: columns.follows(sheet, row, name, names)?,
     };
-    let offset = columns.position(sheet, row, &columns.offset, kind)?.unwrap_or(0.0);
+    let offset = columns.offset.value(sheet, row, kind)?.unwrap_or(0.0);
     if turns {
         link.theta += offset;
     } else {

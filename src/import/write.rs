@@ -1,20 +1,16 @@
 //! The machine file of a chain, with where its numbers come from.
 
 use std::fmt::Write;
-use std::path::Path;
 
-use super::chain::{Chain, Entry, JointEntry, one_line};
+use super::chain::{Chain, Entry, JointEntry};
 use super::step::Move;
 use crate::lie::{Pose, Vec3};
 use crate::machine::{FileUnits, JointKind};
 use crate::units::Unit;
 
-pub(super) fn ron(file: &Path, chain: &Chain) -> String {
-    let name = file.file_name().map_or_else(String::new, |n| one_line(&n.to_string_lossy()));
+pub(super) fn ron(made: &str, chain: &Chain) -> String {
     let units = chain.units;
-    let same = if units == FileUnits::si() { "; m and rad as there" } else { "" };
-    let mut text =
-        format!("// Made by `kincal import` from {name}{same}. Each frame bears the name of its joint.\n");
+    let mut text = format!("{made}\n");
     for line in &chain.told {
         let _ = writeln!(text, "// {}", line.replace(char::is_control, " "));
     }

@@ -17,6 +17,7 @@ mod files;
 mod interrupted;
 mod loads;
 mod machines_in;
+mod new;
 mod outputs;
 mod program;
 mod report;

@@ -1,9 +1,9 @@
 //! The columns of a DH table.
 
+use super::super::cell::{self, Term};
 use super::super::chain::one_line;
+use super::super::position::{Positions, kind, travel};
 use super::super::sheet::{Row, Sheet};
-use super::cell::{self, Term};
-use crate::convert::Stated;
 use crate::error::Result;
 use crate::machine::{FileUnits, JointKind};
 use crate::units::{Quantity, Unit};
@@ -17,10 +17,9 @@ pub(super) struct Columns {
     pub a: usize,
     pub alpha: usize,
     pub beta: Option<usize>,
-    /// Positions: one column for lengths, one for angles, or one of them.
-    pub offset: Vec<usize>,
-    lower: Vec<usize>,
-    upper: Vec<usize>,
+    pub offset: Positions,
+    lower: Positions,
+    upper: Positions,
     sign: Option<usize>,
     displacement: Option<usize>,
 }
@@ -52,19 +51,7 @@ impl Columns {
             return Err(sheet.fault_of_headings(what, format!("leave it out, or name it one of: {KNOWN}")));
         }
         let one = |slot: usize| sheet.column(NAMES[slot].0);
-        let several = |slot: usize| -> Result<Vec<usize>> {
-            let columns = sheet.columns(NAMES[slot].0);
-            for (i, column) in columns.iter().enumerate() {
-                let unit = position_unit(sheet, *column)?;
-                if columns[..i].iter().any(|other| {
-                    position_unit(sheet, *other).is_ok_and(|other| other.quantity == unit.quantity)
-                }) {
-                    let what = format!("column `{}` stands twice", sheet.called(*column));
-                    return Err(sheet.fault_of_headings(what, "leave one of them out"));
-                }
-            }
-            Ok(columns)
-        };
+        let several = |slot: usize| Positions::of(sheet, NAMES[slot].0);
         let needed = |slot: usize, name: &str| -> Result<usize> {
             one(slot)?.ok_or_else(|| {
                 let what = format!("the table has no column `{name}`");
@@ -101,16 +88,7 @@ impl Columns {
     }
 
     pub fn kind(&self, sheet: &Sheet, row: &Row) -> Result<JointKind> {
-        let Some(column) = self.kind else { return Ok(JointKind::Revolute) };
-        match sheet.text(row, column).to_lowercase().as_str() {
-            "revolute" | "rotary" | "continuous" | "hinge" | "r" => Ok(JointKind::Revolute),
-            "prismatic" | "linear" | "slide" | "p" => Ok(JointKind::Prismatic),
-            _ => {
-                let what =
-                    format!("`{}` is no kind of joint", crate::wording::shown(sheet.text(row, column)));
-                Err(sheet.fault(row, column, what, "write revolute or prismatic"))
-            }
-        }
+        self.kind.map_or(Ok(JointKind::Revolute), |column| kind(sheet, row, column))
     }
 
     /// Which way the joint goes when its command grows.
@@ -126,61 +104,8 @@ impl Columns {
         }
     }
 
-    /// What one of these columns says of a joint of this kind, m or rad; nothing where its field is empty.
-    pub fn position(
-        &self,
-        sheet: &Sheet,
-        row: &Row,
-        columns: &[usize],
-        kind: JointKind,
-    ) -> Result<Option<f64>> {
-        let mut found = None;
-        for column in columns {
-            let unit = position_unit(sheet, *column)?;
-            let own = if kind == JointKind::Revolute { Quantity::Angle } else { Quantity::Length };
-            let text = sheet.text(row, *column);
-            if text.is_empty() {
-                continue;
-            }
-            let number = match cell::value(text, unit, |text| sheet.number_in(text)) {
-                Some(cell::Value::Number(number)) if number.abs() < 1e9 => number,
-                _ => return Err(sheet.no_number(row, *column)),
-            };
-            if unit.quantity == own {
-                found = Some(number);
-            } else if number != 0.0 {
-                let (is, other) = match kind {
-                    JointKind::Revolute => ("rotary", "an angle"),
-                    JointKind::Prismatic => ("linear", "a length"),
-                };
-                let what = format!("`{}` is in {unit}, and the joint is {is}", one_line(text));
-                let name = sheet.headings[*column].name.to_lowercase();
-                let mend = format!(
-                    "leave the field empty and give {other} in a column of its own, such as `{name}[{}]`",
-                    if own == Quantity::Angle { "deg" } else { "mm" }
-                );
-                return Err(sheet.fault(row, *column, what, mend));
-            }
-        }
-        Ok(found)
-    }
-
     pub fn travel(&self, sheet: &Sheet, row: &Row, kind: JointKind) -> Result<Option<(f64, f64)>> {
-        let lower = self.position(sheet, row, &self.lower, kind)?;
-        let upper = self.position(sheet, row, &self.upper, kind)?;
-        match (lower, upper) {
-            (Some(lower), Some(upper)) if lower < upper => Ok(Some((lower, upper))),
-            (None, None) => Ok(None),
-            (Some(_), Some(_)) => {
-                let column = self.lower.first().copied().unwrap_or(0);
-                let mend = "write the lower limit first; leave both empty where there is none";
-                Err(sheet.fault(row, column, "the lower limit is not below the upper one", mend))
-            }
-            _ => {
-                let column = self.lower.first().or(self.upper.first()).copied().unwrap_or(0);
-                Err(sheet.fault(row, column, "the joint has one limit", "give both limits, or none"))
-            }
-        }
+        travel(sheet, row, &self.lower, &self.upper, kind)
     }
 
     /// The commands that a joint follows besides or instead of its own.
@@ -200,15 +125,5 @@ impl Columns {
             return Err(sheet.fault(row, column, what, format!("name one of: {}", names.join(", "))));
         }
         Ok(terms)
-    }
-}
-
-/// The unit of a column of positions, which may be lengths or angles.
-fn position_unit(sheet: &Sheet, column: usize) -> Result<Unit> {
-    match &sheet.headings[column].unit {
-        Stated::Unit(spelled) if spelled.quantity() == Quantity::Length => {
-            sheet.unit(column, Quantity::Length)
-        }
-        _ => sheet.unit(column, Quantity::Angle),
     }
 }

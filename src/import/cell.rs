@@ -1,4 +1,4 @@
-//! One field of a DH table: a number, a multiple of pi, or a joint's variable with what is added to it.
+//! One field of a table: a number, a multiple of pi, or a joint's variable with what is added to it.
 
 use crate::units::{Quantity, Unit};
 
