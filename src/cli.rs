@@ -71,7 +71,7 @@ enum Command {
     Import(import::Args),
     /// A recording from a table of another program: other names, units, separators, forms of rotations
     Convert(Box<convert::Args>),
-    /// A calibrated machine as ISO 230-1 table, URDF, DH table, parameters of a control or compensation table
+    /// A calibrated machine as ISO 230-1 table, URDF, MJCF, DH table, parameters of a control or compensation table
     Export(export::Args),
     /// The machines that come with the program, or the file of one of them
     Machines(machines::Args),

@@ -53,7 +53,7 @@
 //! | [`simulate`] | recordings of machines whose errors are known: faults, tests, instruments |
 //! | [`convert`](mod@convert) | recordings from foreign tables (feature `import`) |
 //! | [`import`](mod@import) | machines from URDF, MJCF, DH tables and LinuxCNC (feature `import`) |
-//! | [`export`](mod@export) | calibrated machines as URDF, DH tables, parameters of controls (feature `import`) |
+//! | [`export`](mod@export) | calibrated machines as URDF, MJCF, DH tables, parameters of controls (feature `import`) |
 //! | `demo` | the reference machine, a simulated recording, and what a diagnosis says of it |
 //! | `cli` | the command line, a thin face over all of it (feature `cli`) |
 //!
