@@ -68,3 +68,18 @@ fn an_imported_file_is_a_machine_that_every_command_takes() {
     assert!(said.contains("--tip toe") && said.contains("finger"), "{said}");
     assert!(!Path::new(&folder.path("toe.ron")).exists());
 }
+
+#[test]
+fn no_output_overwrites_a_file_that_a_model_includes() {
+    let folder = Folder::new("included");
+    std::fs::create_dir(folder.0.join("parts")).expect("a folder");
+    for name in ["arm.xml", "parts/defaults.xml", "parts/hand.xml"] {
+        std::fs::copy(Path::new("tests/mjcf").join(name), folder.0.join(name)).expect("copied");
+    }
+    let before = folder.read("parts/hand.xml");
+    let (model, hand) = (folder.path("arm.xml"), folder.path("parts/hand.xml"));
+    let said = fails(1, &["import", &model, "--tip", "tip", "-o", &hand]);
+    assert!(said.contains("--output would overwrite FILE, which the call reads"), "{said}");
+    assert_eq!(folder.read("parts/hand.xml"), before);
+    assert!(done(&["import", &model, "--tip", "tip", "-o", &folder.path("arm.ron")]).contains("5 joints"));
+}
