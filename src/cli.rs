@@ -18,6 +18,7 @@ mod join;
 mod location;
 mod machines;
 mod man;
+mod new;
 mod output;
 mod part;
 mod predict;
@@ -66,11 +67,13 @@ enum Command {
     Verify(verify::Args),
     /// Recordings of a machine whose errors are known: standard tests, random poses, NC programs
     Simulate(Box<simulate::Args>),
-    /// A machine file from a URDF file
+    /// A new machine file with comments: a copy of one that comes with the program, a list of joints, or answers to questions
+    New(new::Args),
+    /// A machine file from URDF, MJCF, a DH table or a configuration of LinuxCNC
     Import(import::Args),
     /// A recording from a table of another program: other names, units, separators, forms of rotations
     Convert(Box<convert::Args>),
-    /// A calibrated machine as ISO 230-1 table, URDF, DH table, parameters of a control or compensation table
+    /// A calibrated machine as ISO 230-1 table, URDF, MJCF, DH table, parameters of a control or compensation table
     Export(export::Args),
     /// The machines that come with the program, or the file of one of them
     Machines(machines::Args),
@@ -136,7 +139,8 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Compensate(args) => compensate::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Simulate(args) => simulate::run(args, files),
-        Command::Import(args) => import::run(args),
+        Command::New(args) => new::run(args),
+        Command::Import(args) => import::run(args, files),
         Command::Convert(args) => convert::run(args, files),
         Command::Export(args) => export::run(args),
         Command::Machines(args) => machines::run(args),

@@ -27,6 +27,9 @@ mod write;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+pub(crate) use cell::plain;
+pub(crate) use form::Separator;
+pub(crate) use heading::{Heading, Stated};
 pub use map::{Map, Part};
 pub use write::Written;
 

@@ -1,4 +1,4 @@
-//! Calibrated machines in the forms of others: ISO 230-1 tables, URDF, DH tables, parameters of controls, compensation tables.
+//! Calibrated machines in the forms of others: ISO 230-1 tables, URDF, MJCF, DH tables, parameters of controls, compensation tables.
 //!
 //! Every form is a file that is written whole, with the numbers that stand in it and with what it cannot hold. A number that the
 //! recordings did not determine is never among those to be entered; it is listed with the reason. `docs/export.md` has the conventions.
@@ -12,6 +12,7 @@ mod iso230;
 mod known;
 mod lines;
 mod linuxcnc;
+mod mjcf;
 mod numbers;
 mod table;
 mod travel;
@@ -37,6 +38,8 @@ pub enum Format {
     Table,
     /// A robot description, m and rad: a new one, or the origins of [`ExportOptions::base_file`].
     Urdf,
+    /// A model of MuJoCo, m and rad: the geometry, joints that follow others, play.
+    Mjcf,
     /// Denavit-Hartenberg parameters, standard convention.
     Dh,
     /// The same, modified convention (Craig).
@@ -56,8 +59,9 @@ pub enum Format {
 }
 
 /// All formats with the word that names each.
-pub const FORMATS: [(Format, &str); 11] = [
+pub const FORMATS: [(Format, &str); 12] = [
     (Format::Urdf, "urdf"),
+    (Format::Mjcf, "mjcf"),
     (Format::Dh, "dh"),
     (Format::Mdh, "mdh"),
     (Format::LinuxCnc, "linuxcnc"),
@@ -182,7 +186,7 @@ impl Exported {
     /// What the file does not hold, as comments behind its first line, where the form has comments.
     fn say_in_file(&mut self, format: Format) {
         let mark = match format {
-            Format::Urdf | Format::LinuxCncComp => return,
+            Format::Urdf | Format::Mjcf | Format::LinuxCncComp => return,
             Format::Siemens | Format::EncComp => ";",
             _ => "#",
         };
@@ -232,6 +236,7 @@ pub fn export(calibrated: &CalibratedMachine, format: Format, options: &ExportOp
             Some(base) => urdf::patched(calibrated, &base.file, &base.text, &base.ends),
             None => urdf::write(calibrated),
         },
+        Format::Mjcf => mjcf::write(calibrated),
         Format::Dh => dh::write(calibrated, false),
         Format::Mdh => dh::write(calibrated, true),
         Format::LinuxCnc => linuxcnc::write(calibrated, options),

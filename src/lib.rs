@@ -51,9 +51,9 @@
 //! | `nc` | NC programs: blocks, words, modal state; written back byte for byte |
 //! | [`compensate`](mod@compensate) | NC programs rewritten so that the actual machine cuts what they mean |
 //! | [`simulate`] | recordings of machines whose errors are known: faults, tests, instruments |
-//! | [`import`](mod@import) | machines from URDF (feature `import`) |
 //! | [`convert`](mod@convert) | recordings from foreign tables (feature `import`) |
-//! | [`export`](mod@export) | calibrated machines as URDF, DH tables, parameters of controls (feature `import`) |
+//! | [`import`](mod@import) | machines from URDF, MJCF, DH tables and LinuxCNC (feature `import`) |
+//! | [`export`](mod@export) | calibrated machines as URDF, MJCF, DH tables, parameters of controls (feature `import`) |
 //! | `demo` | the reference machine, a simulated recording, and what a diagnosis says of it |
 //! | `cli` | the command line, a thin face over all of it (feature `cli`) |
 //!

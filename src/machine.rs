@@ -5,6 +5,7 @@
 //! knows what kind of machine it is. `docs/machines.md` teaches the RON form.
 
 mod dyad;
+mod explain;
 mod fault;
 mod form;
 mod number;
@@ -14,6 +15,7 @@ mod side;
 mod write;
 
 pub use dyad::{Dyad, Joint, JointKind, MassPoint, NcWord, Placement, Tolerance};
+pub use explain::explained;
 pub use fault::MachineFault;
 pub(crate) use form::{AngleUnit, LengthUnit, MachineForm, Triple, UnitsForm};
 pub(crate) use number::{Checked, OF_CALIBRATION, number, vec_to_si};

@@ -84,6 +84,13 @@ impl Files {
         files
     }
 
+    /// The same where files that an argument reads name others, which are read too.
+    pub fn with_inputs(&self, argument: &str, paths: &[PathBuf]) -> Files {
+        let mut files = self.clone();
+        files.inputs.extend(paths.iter().map(|path| Named { argument: argument.into(), path: path.clone() }));
+        files
+    }
+
     /// Refuses outputs that cannot be written, and those that would overwrite an input or each other, before any work is done.
     pub fn check(&self) -> Outcome {
         for (i, output) in self.outputs.iter().enumerate() {

@@ -20,7 +20,7 @@ pub(super) fn is_drop_out(field: &str) -> bool {
 }
 
 /// The field as a plain decimal number with a point, if it is one; its digits stay as they are.
-pub(super) fn plain(field: &str, comma: bool) -> Option<String> {
+pub(crate) fn plain(field: &str, comma: bool) -> Option<String> {
     let field = field.trim();
     let field = field.strip_prefix('+').unwrap_or(field);
     let (has_point, has_comma) = (field.contains('.'), field.contains(','));

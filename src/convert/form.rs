@@ -4,7 +4,7 @@ use super::cell::{self, Kind};
 
 /// What stands between two columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Separator {
+pub(crate) enum Separator {
     Byte(u8),
     /// One blank or many.
     Blanks,

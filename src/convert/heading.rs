@@ -4,7 +4,7 @@ use super::unit::{Spelled, spelled};
 
 /// A heading, taken apart.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Heading {
+pub(crate) struct Heading {
     /// As written.
     pub raw: String,
     /// Without its unit, as written.
@@ -16,7 +16,7 @@ pub(super) struct Heading {
 
 /// What a heading says of the unit.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Stated {
+pub(crate) enum Stated {
     Nothing,
     Unit(Spelled),
     /// A unit that recordings do not have, such as `mm/s`.

@@ -4,7 +4,7 @@ use crate::units::{Quantity, UNITS, Unit};
 
 /// A unit of a table, and the unit of recordings that its numbers become.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Spelled {
+pub(crate) struct Spelled {
     /// Unit of the recording.
     pub unit: Unit,
     /// A number of the table times this, over `over`, is one in `unit`.

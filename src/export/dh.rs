@@ -114,6 +114,41 @@ fn drive(machine: &Machine, line: &Line) -> String {
     line.terms.iter().map(term).collect::<Vec<_>>().join(" + ")
 }
 
+/// Which kinds of joints have a travel: each has columns of its own, in its unit.
+struct Limited {
+    kinds: Vec<JointKind>,
+}
+
+impl Limited {
+    fn of(machine: &Machine, lines: &Lines) -> Limited {
+        let limited = |kind: &JointKind| {
+            lines.lines.iter().any(|line| line.kind == *kind && travel(machine, line).is_some())
+        };
+        let kinds = [JointKind::Revolute, JointKind::Prismatic].into_iter().filter(limited).collect();
+        Limited { kinds }
+    }
+
+    fn headings(&self) -> String {
+        let both = |kind: &JointKind| match kind {
+            JointKind::Revolute => ",lower[rad],upper[rad]",
+            JointKind::Prismatic => ",lower[m],upper[m]",
+        };
+        self.kinds.iter().map(both).collect()
+    }
+
+    fn fields(&self, machine: &Machine, line: &Line) -> String {
+        let both = |kind: &JointKind| match travel(machine, line).filter(|_| *kind == line.kind) {
+            Some((lower, upper)) => format!(",{},{}", exact(lower), exact(upper)),
+            None => ",,".to_string(),
+        };
+        self.kinds.iter().map(both).collect()
+    }
+}
+
+fn travel(machine: &Machine, line: &Line) -> Option<(f64, f64)> {
+    machine.dyads()[line.dyad].joint.as_ref()?.travel
+}
+
 /// The table; `modified` after Craig, where a row begins with what lies before its joint.
 pub(super) fn write(calibrated: &CalibratedMachine, modified: bool) -> Result<Exported> {
     let machine = calibrated.machine();
@@ -142,9 +177,15 @@ pub(super) fn write(calibrated: &CalibratedMachine, modified: bool) -> Result<Ex
         let six = pose.translation.0.into_iter().chain(pose.rotation_vector().0);
         six.map(exact).collect::<Vec<_>>().join(",")
     };
+    let _ = writeln!(text, "# machine: {}", machine.name());
     let _ = writeln!(text, "# base[m,rad]: {}", placed(table.w_from_first));
     let _ = writeln!(text, "# tool[m,rad]: {}", placed(table.last_from_t));
-    text.push_str("joint,kind,displacement,theta[rad],d[m],a[m],alpha[rad],beta[rad]\n");
+    let limited = Limited::of(machine, &lines);
+    let _ = writeln!(
+        text,
+        "joint,kind,displacement,theta[rad],d[m],a[m],alpha[rad],beta[rad]{}",
+        limited.headings()
+    );
     let mut numbers = Vec::new();
     for (i, line) in lines.lines.iter().enumerate() {
         let name = machine.dyads()[line.dyad].joint.as_ref().map_or("", |joint| &joint.name);
@@ -160,7 +201,13 @@ pub(super) fn write(calibrated: &CalibratedMachine, modified: bool) -> Result<Ex
         let kind = if line.kind == JointKind::Revolute { "revolute" } else { "prismatic" };
         let values = [own.theta, own.d, own.a, own.alpha, own.beta];
         let before = [was.theta, was.d, was.a, was.alpha, was.beta];
-        let _ = writeln!(text, "{name},{kind},{},{}", drive(machine, line), values.map(exact).join(","));
+        let _ = writeln!(
+            text,
+            "{name},{kind},{},{}{}",
+            drive(machine, line),
+            values.map(exact).join(","),
+            limited.fields(machine, line)
+        );
         for ((parameter, unit), (value, declared)) in
             [("theta", "rad"), ("d", "m"), ("a", "m"), ("alpha", "rad"), ("beta", "rad")]
                 .into_iter()

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::control::{Seen, common, unit};
 use super::curve::Curve;
 use super::lines::Lines;
-use super::numbers::{DEG, MM, fixed, heading};
+use super::numbers::{DEG, MM, fine, fixed, heading};
 use super::table::POINTS;
 use super::travel::poses;
 use super::{ExportOptions, Exported, Number, refused};
@@ -289,7 +289,7 @@ pub(super) fn write(calibrated: &CalibratedMachine, options: &ExportOptions) -> 
                 fixed(value),
                 fixed(was)
             ),
-            None => writeln!(text, "setp {name} {} # declared {}{note}", fixed(value), fixed(was)),
+            None => writeln!(text, "setp {name} {} # declared {}{note}", fine(value), fixed(was)),
             Some(because) => writeln!(text, "# {name} is not entered: {because}"),
         };
         exported.numbers.push(Number {

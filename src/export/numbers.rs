@@ -32,6 +32,13 @@ pub(super) fn fixed(value: f64) -> String {
     if text.trim_start_matches(['-', '0', '.']).is_empty() { "0.000000".into() } else { text }
 }
 
+/// A number with ten decimals, zeros at its end left out.
+pub(super) fn fine(value: f64) -> String {
+    let text = format!("{value:.10}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text.trim_start_matches(['-', '0']).is_empty() { "0".into() } else { text.to_string() }
+}
+
 /// As short as it reads back.
 pub(super) fn exact(x: f64) -> String {
     let text = format!("{:?}", if x == 0.0 { 0.0 } else { x });

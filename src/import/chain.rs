@@ -5,7 +5,7 @@ use super::names::{Names, usable};
 use super::step::{Mass, Mimic, Motion, Move, Robot, Step};
 use crate::error::{Error, Result};
 use crate::lie::{Pose, Twist, Vec3};
-use crate::machine::JointKind;
+use crate::machine::{FileUnits, JointKind};
 
 /// One entry of a machine file.
 pub(super) struct Entry {
@@ -26,12 +26,17 @@ pub(super) struct JointEntry {
     pub kind: JointKind,
     pub axis: Vec3<f64>,
     pub travel: Option<(f64, f64)>,
-    pub follows: Option<(String, f64)>,
+    /// Leaders with their factors; nothing where the joint has a command of its own alone.
+    pub follows: Vec<(String, f64)>,
+    /// Address in NC programs, where it is not the name in capitals.
+    pub nc: Option<String>,
 }
 
 pub(super) struct Chain {
     pub name: String,
     pub about: String,
+    /// Units of the machine file.
+    pub units: FileUnits,
     pub workpiece: Vec<Entry>,
     pub tool: Vec<Entry>,
     pub told: Vec<String>,
@@ -53,15 +58,15 @@ pub(super) fn cut(robot: &Robot, ends: &Ends) -> Result<Chain> {
     let top = |steps: &[&Step], own: usize| steps.first().map_or(own, |s| s.parent);
     if top(&up, base) != top(&down, tip) {
         let what = format!(
-            "no joints lead from link \"{}\" to \"{}\"",
-            robot.links[base].name, robot.links[tip].name
+            "no joints lead from {} \"{}\" to \"{}\"",
+            robot.noun, robot.links[base].name, robot.links[tip].name
         );
-        let mend = "name two links of one tree by --base and --tip";
+        let mend = format!("name two {}s of one tree by --base and --tip", robot.noun);
         return Err(Error::mistake(robot.place(robot.links[tip].line), what, mend));
     }
     let shared = up.iter().zip(&down).take_while(|(a, b)| std::ptr::eq(**a, **b)).count();
     if up[..shared].iter().any(|step| step.motion != Motion::Fixed || !step.moves.is_empty()) {
-        told.push("the base stands on other links of the description; gravity is taken along -z of the link that carries both ends".into());
+        told.push(format!("the base stands on other {0}s of the description; gravity is taken along -z of the {0} that carries both ends", robot.noun));
     }
     let (up, down) = (&up[shared..], &down[shared..]);
     let mut names = Names::default();
@@ -84,7 +89,8 @@ pub(super) fn cut(robot: &Robot, ends: &Ends) -> Result<Chain> {
         one_line(&robot.links[base].name),
         one_line(&robot.links[tip].name)
     );
-    Ok(Chain { name: usable(&robot.name, "robot_"), about, workpiece, tool, told })
+    let units = robot.units;
+    Ok(Chain { name: usable(&robot.name, "robot_"), about, units, workpiece, tool, told })
 }
 
 /// A text of the description where a line must stay one, in quotes or as a comment.
@@ -115,7 +121,7 @@ fn parents(robot: &Robot) -> Result<Vec<Option<usize>>> {
 fn link(robot: &Robot, name: &str, option: &str) -> Result<usize> {
     robot.links.iter().position(|l| l.name == name).ok_or_else(|| {
         let known = listed(robot.links.iter().map(|l| l.name.as_str()));
-        let what = format!("{option} {name}: there is no such link");
+        let what = format!("{option} {name}: there is no such {}", robot.noun);
         Error::mistake(robot.place(0), what, format!("name one of: {known}"))
     })
 }
@@ -136,12 +142,12 @@ fn root(robot: &Robot, above: &[Option<usize>], told: &mut Vec<String>) -> Resul
         if roots.len() > 1 { roots.iter().filter(carrying).copied().collect() } else { roots };
     match found[..] {
         [root] => {
-            told.push(format!("base is the root, link \"{}\"", robot.links[root].name));
+            told.push(format!("base is the root, {} \"{}\"", robot.noun, robot.links[root].name));
             Ok(root)
         }
         _ => {
             let names = listed(found.iter().map(|l| robot.links[*l].name.as_str()));
-            let what = format!("{} links stand on no other one", found.len());
+            let what = format!("{} {}s stand on no other one", found.len(), robot.noun);
             let mend = if found.is_empty() {
                 "leave the joint out that closes the loop".into()
             } else {
@@ -154,9 +160,10 @@ fn root(robot: &Robot, above: &[Option<usize>], told: &mut Vec<String>) -> Resul
 
 /// The only link behind `base` that carries nothing and that a joint moves.
 fn only_end(robot: &Robot, above: &[Option<usize>], base: usize, told: &mut Vec<String>) -> Result<usize> {
-    let carries = |l: usize| robot.steps.iter().any(|step| step.parent == l);
+    let parts = |step: &&Step| robot.links[step.child].is_part;
+    let carries = |l: usize| robot.steps.iter().filter(parts).any(|step| step.parent == l);
     let mut ends = Vec::new();
-    for l in (0..robot.links.len()).filter(|l| !carries(*l)) {
+    for l in (0..robot.links.len()).filter(|l| robot.links[*l].is_part && !carries(*l)) {
         let steps = path(robot, above, l)?;
         let from = steps.iter().position(|step| step.parent == base);
         if from.is_some_and(|from| steps[from..].iter().any(|step| step.motion != Motion::Fixed)) {
@@ -165,17 +172,19 @@ fn only_end(robot: &Robot, above: &[Option<usize>], base: usize, told: &mut Vec<
     }
     match ends[..] {
         [end] => {
-            told.push(format!("tip is the only end, link \"{}\"", robot.links[end].name));
+            told.push(format!("tip is the only end, {} \"{}\"", robot.noun, robot.links[end].name));
             Ok(end)
         }
         [] => {
-            let what = format!("nothing moves behind link \"{}\"", robot.links[base].name);
-            Err(Error::mistake(robot.place(robot.links[base].line), what, "name another link by --base"))
+            let what = format!("nothing moves behind {} \"{}\"", robot.noun, robot.links[base].name);
+            let mend = format!("name another {} by --base", robot.noun);
+            Err(Error::mistake(robot.place(robot.links[base].line), what, mend))
         }
         _ => {
             let what = format!("the robot has {} ends", ends.len());
             let mend = format!(
-                "name the link that is the tool by --tip, such as one of: {}",
+                "name the {} that is the tool by --tip, such as one of: {}",
+                robot.noun,
                 listed(ends.iter().map(|l| robot.links[*l].name.as_str()))
             );
             Err(Error::mistake(robot.place(0), what, mend))
@@ -224,17 +233,17 @@ impl Maker<'_> {
                     return Err(Error::mistake(self.robot.place(step.line), what, mend));
                 }
                 Motion::Fixed => {
-                    notes.push(format!("{} (fixed, line {})", one_line(&step.name), step.line));
+                    notes.push(format!("{} (fixed, {})", one_line(&step.name), self.robot.line(step.line)));
                     continue;
                 }
                 Motion::Moving { kind, axis, travel, mimic } => (*kind, *axis, *travel, mimic),
             };
-            notes.push(format!("{} (line {})", one_line(&step.name), step.line));
+            notes.push(format!("{} ({})", one_line(&step.name), self.robot.line(step.line)));
             let frame = self.given[self.next].1.clone();
             self.next += 1;
             let (follows, offset) = match mimic {
                 Some(mimic) => self.follow(step, mimic),
-                None => (None, 0.0),
+                None => (Vec::new(), 0.0),
             };
             let twist = match kind {
                 JointKind::Prismatic => Twist::new(axis.times(offset), Vec3([0.0; 3])),
@@ -244,7 +253,7 @@ impl Maker<'_> {
                 frame,
                 moves: std::mem::take(&mut moves),
                 offset: (offset != 0.0).then(|| Pose::exp(twist)),
-                joint: Some(JointEntry { kind, axis, travel, follows }),
+                joint: Some(JointEntry { kind, axis, travel, follows, nc: None }),
                 mass: None,
                 steps: std::mem::take(&mut passed),
                 note: std::mem::take(&mut notes).join(", "),
@@ -252,7 +261,9 @@ impl Maker<'_> {
             self.weigh(&mut entry, step.child);
             entries.push(entry);
         }
-        notes.push(format!("link {}", one_line(&self.robot.links[end_link].name)));
+        let link = &self.robot.links[end_link];
+        // What only marks a place is the last step itself.
+        notes.extend(link.is_part.then(|| format!("{} {}", self.robot.noun, one_line(&link.name))));
         let note = notes.join(", ");
         entries.push(Entry {
             frame: end.into(),
@@ -271,9 +282,7 @@ impl Maker<'_> {
         let mut waiting = vec![(carried, Pose::identity(0.0))];
         while let Some((link, joint_from_link)) = waiting.pop() {
             let bolted = self.robot.steps.iter().filter(|s| s.parent == link && s.motion == Motion::Fixed);
-            waiting.extend(
-                bolted.map(|s| (s.child, s.moves.iter().fold(joint_from_link, |pose, m| pose * m.pose()))),
-            );
+            waiting.extend(bolted.map(|s| (s.child, joint_from_link * Move::all(&s.moves))));
             let Some((kg, centre)) = self.robot.links[link].mass else { continue };
             let centre = joint_from_link.transform(centre);
             entry.mass = Some(match entry.mass {
@@ -284,7 +293,7 @@ impl Maker<'_> {
     }
 
     /// What a mimic joint follows in the chain, and by what offset. Leaders that follow others are followed to the first.
-    fn follow(&mut self, step: &Step, mimic: &Mimic) -> (Option<(String, f64)>, f64) {
+    fn follow(&mut self, step: &Step, mimic: &Mimic) -> (Vec<(String, f64)>, f64) {
         let mut total = mimic.clone();
         for _ in 0..self.robot.steps.len() {
             let leader = self.robot.steps.iter().find(|s| s.name == total.leader);
@@ -295,13 +304,13 @@ impl Maker<'_> {
         }
         let name = one_line(&step.name);
         match self.given.iter().find(|(own, _)| *own == total.leader && *own != step.name) {
-            Some((_, given)) => (Some((given.clone(), total.factor)), total.offset),
+            Some((_, given)) => (vec![(given.clone(), total.factor)], total.offset),
             None => {
                 let leader = one_line(&total.leader);
                 self.told.push(format!(
                     "joint \"{name}\" follows \"{leader}\", which is not in the chain: it has a command of its own"
                 ));
-                (None, 0.0)
+                (Vec::new(), 0.0)
             }
         }
     }

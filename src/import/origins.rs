@@ -6,6 +6,7 @@ use std::path::Path;
 use roxmltree::Node;
 
 use super::chain::{Chain, Entry, cut};
+use super::step::Move;
 use super::xml::{Source, child};
 use super::{Ends, Imported, machine_of, urdf};
 use crate::error::Result;
@@ -60,7 +61,7 @@ pub(crate) fn origins(file: &Path, text: &str, ends: &Ends) -> Result<(Imported,
             let step = &robot.steps[*s];
             // Steps are the joints of the document in its order.
             let node = joints.get(*s)?;
-            let pose = step.moves.iter().fold(Pose::identity(0.0), |pose, m| pose * m.pose());
+            let pose = Move::all(&step.moves);
             let edit = edit(&source, *node)?;
             Some(Origin { joint: step.name.clone(), line: step.line, parent_from_joint: pose, edit })
         });

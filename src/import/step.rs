@@ -1,24 +1,45 @@
 //! What leads from one link to the next: elementary moves and joints.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::error::Place;
 use crate::lie::{Pose, Vec3};
-use crate::machine::JointKind;
+use crate::machine::{FileUnits, JointKind};
 
-/// An elementary move: letter of its axis, whether it turns, and by how much (m or rad).
+/// A move from one frame to the next, m and rad: elementary, about or along the axis 0, 1, 2; or any.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Move {
-    pub turn: bool,
-    pub axis: usize,
-    pub by: f64,
+pub(super) enum Move {
+    Turn(usize, f64),
+    Shift(usize, f64),
+    Pose(Pose<f64>),
 }
 
 impl Move {
     pub fn pose(self) -> Pose<f64> {
-        let mut unit = Vec3([0.0; 3]);
-        unit.0[self.axis] = 1.0;
-        if self.turn { Pose::turn(unit, self.by) } else { Pose::translation(unit.times(self.by)) }
+        let unit = |axis: usize| Vec3(std::array::from_fn(|i| f64::from(u8::from(i == axis))));
+        match self {
+            Move::Turn(axis, by) => Pose::turn(unit(axis), by),
+            Move::Shift(axis, by) => Pose::translation(unit(axis).times(by)),
+            Move::Pose(pose) => pose,
+        }
+    }
+
+    /// Whether it leaves everything where it is.
+    pub fn is_none(&self) -> bool {
+        match self {
+            Move::Turn(_, by) | Move::Shift(_, by) => *by == 0.0,
+            Move::Pose(pose) => *pose == Pose::identity(0.0),
+        }
+    }
+
+    /// All of them, one behind the other.
+    pub fn all(moves: &[Move]) -> Pose<f64> {
+        moves.iter().fold(Pose::identity(0.0), |pose, m| pose * m.pose())
+    }
+
+    /// Along x, y and z.
+    pub fn shifts(by: Vec3<f64>) -> [Move; 3] {
+        std::array::from_fn(|axis| Move::Shift(axis, by.0[axis]))
     }
 }
 
@@ -68,6 +89,8 @@ pub(super) struct Link {
     pub name: String,
     pub line: usize,
     pub mass: Option<Mass>,
+    /// Whether it is a part of the robot. What only marks a place on one is an end where it is named as such, never by itself.
+    pub is_part: bool,
 }
 
 /// A description of a robot, as it stands in the file.
@@ -75,6 +98,12 @@ pub(super) struct Link {
 pub(super) struct Robot {
     pub file: PathBuf,
     pub name: String,
+    /// What it calls its links.
+    pub noun: &'static str,
+    /// Files and lines by line, where the text was put together from several files.
+    pub lines: Vec<(PathBuf, usize)>,
+    /// Units of the machine file.
+    pub units: FileUnits,
     pub links: Vec<Link>,
     pub steps: Vec<Step>,
     pub told: Vec<String>,
@@ -82,6 +111,22 @@ pub(super) struct Robot {
 
 impl Robot {
     pub fn place(&self, line: usize) -> Place {
-        Place::at(Path::new(&self.file), line, 0)
+        match line.checked_sub(1).and_then(|i| self.lines.get(i)) {
+            Some((file, line)) => Place::at(file, *line, 0),
+            None => Place::at(&self.file, line, 0),
+        }
+    }
+
+    /// A line as notes name it.
+    pub fn line(&self, line: usize) -> String {
+        let place = self.place(line);
+        match place.file == self.file {
+            true => format!("line {}", place.line),
+            false => {
+                let folder = self.file.parent().unwrap_or(&self.file);
+                let file = place.file.strip_prefix(folder).unwrap_or(&place.file);
+                format!("line {} of {}", place.line, file.display())
+            }
+        }
     }
 }

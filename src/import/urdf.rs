@@ -9,7 +9,7 @@ use super::step::{Link, Mass, Mimic, Motion, Move, Robot, Step};
 use super::xml::{Source, child};
 use crate::error::Result;
 use crate::lie::Vec3;
-use crate::machine::JointKind;
+use crate::machine::{FileUnits, JointKind};
 
 pub(super) fn read(file: &Path, text: &str) -> Result<Robot> {
     let source = Source::new(file, text)?;
@@ -25,11 +25,14 @@ pub(super) fn read(file: &Path, text: &str) -> Result<Robot> {
     }
     if root.tag_name().name() != "robot" {
         let what = format!("the file begins with <{}>, URDF with <robot>", root.tag_name().name());
-        return Err(source.fault(root, what, "name a URDF file; MJCF, SDF and DH tables are not read yet"));
+        return Err(source.fault(root, what, "name a URDF or MJCF file; SDF is not read"));
     }
     let mut robot = Robot {
         file: file.to_path_buf(),
         name: root.attribute("name").unwrap_or("robot").to_string(),
+        noun: "link",
+        lines: Vec::new(),
+        units: FileUnits::si(),
         links: Vec::new(),
         steps: Vec::new(),
         told: Vec::new(),
@@ -43,7 +46,7 @@ pub(super) fn read(file: &Path, text: &str) -> Result<Robot> {
             return Err(source.fault(node, what, "give one of them another name"));
         }
         let mass = mass(&source, node, &name, &mut robot.told);
-        robot.links.push(Link { name, line: source.line(node), mass });
+        robot.links.push(Link { name, line: source.line(node), mass, is_part: true });
     }
     for node in root.children().filter(|n| n.is_element() && n.tag_name().name() == "joint") {
         robot.steps.push(step(&source, node, &index)?);
@@ -92,9 +95,8 @@ fn step(source: &Source, node: Node, index: &HashMap<String, usize>) -> Result<S
 fn moves(source: &Source, origin: Node) -> Result<Vec<Move>> {
     let xyz = source.finite::<3>(origin, "xyz")?.unwrap_or_default();
     let rpy = source.finite::<3>(origin, "rpy")?.unwrap_or_default();
-    let along = (0..3).map(|axis| Move { turn: false, axis, by: xyz[axis] });
-    let about = (0..3).rev().map(|axis| Move { turn: true, axis, by: rpy[axis] });
-    Ok(along.chain(about).filter(|m| m.by != 0.0).collect())
+    let about = (0..3).rev().map(|axis| Move::Turn(axis, rpy[axis]));
+    Ok(Move::shifts(Vec3(xyz)).into_iter().chain(about).filter(|m| !m.is_none()).collect())
 }
 
 fn motion(source: &Source, node: Node, name: &str) -> Result<Motion> {

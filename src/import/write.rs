@@ -1,30 +1,29 @@
 //! The machine file of a chain, with where its numbers come from.
 
 use std::fmt::Write;
-use std::path::Path;
 
-use super::chain::{Chain, Entry, JointEntry, one_line};
+use super::chain::{Chain, Entry, JointEntry};
+use super::step::Move;
 use crate::lie::{Pose, Vec3};
-use crate::machine::JointKind;
+use crate::machine::{FileUnits, JointKind};
+use crate::units::Unit;
 
-pub(super) fn ron(file: &Path, chain: &Chain) -> String {
-    let name = file.file_name().map_or_else(String::new, |n| one_line(&n.to_string_lossy()));
-    let mut text = format!(
-        "// Made by `kincal import` from {name}; m and rad as there. Each frame bears the name of its joint.\n"
-    );
+pub(super) fn ron(made: &str, chain: &Chain) -> String {
+    let units = chain.units;
+    let mut text = format!("{made}\n");
     for line in &chain.told {
         let _ = writeln!(text, "// {}", line.replace(char::is_control, " "));
     }
     text.push_str("// Tolerances are those of a machine about which nothing is known; state yours: `tolerance: (translation: .., rotation: ..)`.\n");
     let _ = writeln!(
         text,
-        "Machine(\n    name: \"{}\",\n    about: \"{}\",\n    units: (length: m, angle: rad),",
-        chain.name, chain.about
+        "Machine(\n    name: \"{}\",\n    about: \"{}\",\n    units: (length: {}, angle: {}),",
+        chain.name, chain.about, units.length, units.angle
     );
     for (field, entries) in [("workpiece", &chain.workpiece), ("tool", &chain.tool)] {
         let _ = writeln!(text, "    {field}: [");
         for e in entries {
-            let _ = writeln!(text, "        {}, // {}", entry(e), e.note);
+            let _ = writeln!(text, "        {}, // {}", entry(e, units), e.note);
         }
         text.push_str("    ],\n");
     }
@@ -32,40 +31,53 @@ pub(super) fn ron(file: &Path, chain: &Chain) -> String {
     text
 }
 
-fn entry(entry: &Entry) -> String {
+fn entry(entry: &Entry, units: FileUnits) -> String {
     let mut text = format!("(frame: \"{}\"", entry.frame);
-    if let Some(offset) = entry.offset {
-        let pose = entry.moves.iter().fold(Pose::identity(0.0), |pose, m| pose * m.pose()) * offset;
-        let _ =
-            write!(text, ", at: {}, rotation: {}", triple(pose.translation), triple(pose.rotation_vector()));
-    } else if entry.moves.iter().all(|m| !m.turn) {
-        let mut at = Vec3([0.0; 3]);
-        entry.moves.iter().for_each(|m| at.0[m.axis] += m.by);
-        if at.0 != [0.0; 3] {
-            let _ = write!(text, ", at: {}", triple(at));
+    let elementary = |m: &Move| match *m {
+        Move::Turn(axis, by) => Some(("R", axis, units.angle, by)),
+        Move::Shift(axis, by) => Some(("T", axis, units.length, by)),
+        Move::Pose(_) => None,
+    };
+    let moves: Option<Vec<_>> = entry.moves.iter().map(elementary).collect();
+    match moves.filter(|_| entry.offset.is_none()) {
+        None => {
+            let pose = Move::all(&entry.moves) * entry.offset.unwrap_or(Pose::identity(0.0));
+            let (at, turn) = (pose.translation, pose.rotation_vector());
+            if at.0 != [0.0; 3] {
+                let _ = write!(text, ", at: {}", triple(at, units.length));
+            }
+            if turn.0 != [0.0; 3] {
+                let _ = write!(text, ", rotation: {}", triple(turn, units.angle));
+            }
         }
-    } else {
-        let word = |turn| if turn { 'R' } else { 'T' };
-        let moves = entry
-            .moves
-            .iter()
-            .map(|m| format!("{}{}({})", word(m.turn), ["x", "y", "z"][m.axis], number(m.by)));
-        let _ = write!(text, ", moves: [{}]", moves.collect::<Vec<_>>().join(", "));
+        Some(moves) if moves.iter().all(|(word, ..)| *word == "T") => {
+            let mut at = Vec3([0.0; 3]);
+            moves.iter().for_each(|(_, axis, _, by)| at.0[*axis] += by);
+            if at.0 != [0.0; 3] {
+                let _ = write!(text, ", at: {}", triple(at, units.length));
+            }
+        }
+        Some(moves) => {
+            let moves = moves.iter().map(|(word, axis, unit, by)| {
+                format!("{word}{}({})", ["x", "y", "z"][*axis], number(unit.write_si(*by)))
+            });
+            let _ = write!(text, ", moves: [{}]", moves.collect::<Vec<_>>().join(", "));
+        }
     }
     if let Some(joint) = &entry.joint {
-        let _ = write!(text, ", joint: {}", joint_text(joint));
+        let _ = write!(text, ", joint: {}", joint_text(joint, units));
     }
     if let Some((kg, centre)) = entry.mass {
-        let _ = write!(text, ", mass: {}, centre_of_mass: {}", number(kg), triple(centre));
+        let _ = write!(text, ", mass: {}, centre_of_mass: {}", number(kg), triple(centre, units.length));
     }
     text.push(')');
     text
 }
 
-fn joint_text(joint: &JointEntry) -> String {
-    let kind = match joint.kind {
-        JointKind::Prismatic => "Prismatic",
-        JointKind::Revolute => "Revolute",
+fn joint_text(joint: &JointEntry, units: FileUnits) -> String {
+    let (kind, unit) = match joint.kind {
+        JointKind::Prismatic => ("Prismatic", units.length),
+        JointKind::Revolute => ("Revolute", units.angle),
     };
     let words = ["x", "y", "z"]
         .iter()
@@ -74,20 +86,27 @@ fn joint_text(joint: &JointEntry) -> String {
     let word = words
         .into_iter()
         .find(|(i, sign, _)| (0..3).all(|k| joint.axis.0[k] == if k == *i { *sign } else { 0.0 }));
-    let axis = word.map_or_else(|| triple(joint.axis), |(_, _, w)| format!("\"{w}\""));
+    let plain = || format!("({})", joint.axis.0.map(number).join(", "));
+    let axis = word.map_or_else(plain, |(_, _, w)| format!("\"{w}\""));
     let mut text = format!("{kind}(axis: {axis}");
     if let Some((lower, upper)) = joint.travel {
-        let _ = write!(text, ", travel: ({}, {})", number(lower), number(upper));
+        let [lower, upper] = [lower, upper].map(|x| number(unit.write_si(x)));
+        let _ = write!(text, ", travel: ({lower}, {upper})");
     }
-    if let Some((leader, factor)) = &joint.follows {
-        let _ = write!(text, ", follows: {{\"{leader}\": {}}}", number(*factor));
+    if !joint.follows.is_empty() {
+        let leaders =
+            joint.follows.iter().map(|(leader, factor)| format!("\"{leader}\": {}", number(*factor)));
+        let _ = write!(text, ", follows: {{{}}}", leaders.collect::<Vec<_>>().join(", "));
+    }
+    if let Some(address) = &joint.nc {
+        let _ = write!(text, ", nc: (address: \"{address}\", sign: 1)");
     }
     text.push(')');
     text
 }
 
-fn triple(v: Vec3<f64>) -> String {
-    format!("({})", v.0.map(number).join(", "))
+fn triple(v: Vec3<f64>, unit: Unit) -> String {
+    format!("({})", v.0.map(|x| number(unit.write_si(x))).join(", "))
 }
 
 /// As short as it reads back.

@@ -1,6 +1,6 @@
 //! XML with places: elements, attributes and the numbers in them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Error as XmlError, Node, ParsingOptions};
 
@@ -19,14 +19,21 @@ pub(super) struct Source<'a> {
     cut: usize,
     /// Declarations that were put in: where, and how many bytes.
     put_in: (usize, usize),
+    /// Files and lines by line, where the text was put together from several files.
+    lines: Vec<(PathBuf, usize)>,
 }
 
 impl<'a> Source<'a> {
     pub fn new(file: &'a Path, text: &str) -> Result<Self> {
+        Source::of_pieces(file, text, Vec::new())
+    }
+
+    /// A text that was put together from several files; `lines` says where each line comes from.
+    pub fn of_pieces(file: &'a Path, text: &str, lines: Vec<(PathBuf, usize)>) -> Result<Self> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let before = text[..text.len() - start.len()].matches('\n').count();
-        let mut source =
-            Source { file, text: start.to_string(), before, cut: text.len() - start.len(), put_in: (0, 0) };
+        let cut = text.len() - start.len();
+        let mut source = Source { file, text: start.to_string(), before, cut, put_in: (0, 0), lines };
         for _ in 0..MOST_PREFIXES {
             let Err(XmlError::UnknownNamespace(prefix, _)) = source.parse() else { break };
             let Some(at) = source.after_root_name() else { break };
@@ -35,7 +42,7 @@ impl<'a> Source<'a> {
             source.text.insert_str(at, &declaration);
         }
         source.parse().map_err(|e| {
-            let place = Place::at(file, e.pos().row as usize + before, e.pos().col as usize);
+            let place = source.place_of(e.pos().row as usize + before, e.pos().col as usize);
             let why = e.to_string();
             let why = why.split(" at ").next().unwrap_or_default().to_string();
             Error::mistake(
@@ -86,7 +93,18 @@ impl<'a> Source<'a> {
     }
 
     pub fn fault(&self, node: Node, what: impl Into<String>, mend: impl Into<String>) -> Error {
-        Error::mistake(Place::at(self.file, self.line(node), 0), what, mend)
+        Error::mistake(self.place(node), what, mend)
+    }
+
+    pub fn place(&self, node: Node) -> Place {
+        self.place_of(self.line(node), 0)
+    }
+
+    fn place_of(&self, line: usize, column: usize) -> Place {
+        match line.checked_sub(1).and_then(|i| self.lines.get(i)) {
+            Some((file, line)) => Place::at(file, *line, column),
+            None => Place::at(self.file, line, column),
+        }
     }
 
     /// Numbers of an attribute, as many as asked for; nothing where it is missing or empty.
@@ -120,6 +138,28 @@ impl<'a> Source<'a> {
         }
         Ok(numbers)
     }
+}
+
+/// Whether the first element of a text has this name, whatever follows.
+pub(super) fn is_root(text: &str, name: &str) -> bool {
+    let mut at = 0;
+    while let Some(found) = text[at..].find('<') {
+        at += found;
+        let rest = &text[at..];
+        let end = match () {
+            () if rest.starts_with("<!--") => "-->",
+            () if rest.starts_with("<?") || rest.starts_with("<!") => ">",
+            () => {
+                let behind = rest[1..].strip_prefix(name);
+                return behind.is_some_and(|rest| {
+                    rest.starts_with(|c: char| c.is_whitespace() || matches!(c, '>' | '/'))
+                });
+            }
+        };
+        let Some(found) = rest.find(end) else { return false };
+        at += found + end.len();
+    }
+    false
 }
 
 fn count(n: usize) -> String {

@@ -22,7 +22,7 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 17] = [
+const TABLE: [Row; 18] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--report", "--json"]),
@@ -48,7 +48,8 @@ const TABLE: [Row; 17] = [
         &["MACHINE.ron", "--input", "--faults"],
         &["--output", "--nc", "--truth", "--json"],
     ),
-    row("import", &[], &["ROBOT.urdf"], &["--output", "--json"]),
+    row("new", &[], &["--joints"], &["--output", "--json"]),
+    row("import", &[], &["FILE", "--hal"], &["--output", "--json"]),
     row("convert", &[], &["FILE", "--machine", "--map"], &["--write-map", "--output", "--json"]),
     row("export", &["--to", "urdf"], &["CALIBRATED.ron", "--base-file"], &["--output", "--json"]),
     row("machines", &[], &[], &["--json"]),
@@ -69,7 +70,7 @@ impl Row {
             command.args([name, path]);
         }
         // What a command cannot do without.
-        let needs_output = ["join", "simulate", "import", "convert"].contains(&self.command);
+        let needs_output = ["join", "simulate", "new", "import", "convert"].contains(&self.command);
         if needs_output && written.iter().all(|(name, _)| *name != "--output") {
             command.args(["--output", "elsewhere"]);
         }

@@ -18,6 +18,7 @@ mod files;
 mod interrupted;
 mod loads;
 mod machines_in;
+mod new;
 mod outputs;
 mod program;
 mod report;

@@ -163,6 +163,82 @@ fn a_chain_rebuilt_from_its_dh_table_is_the_same_machine() {
     assert!(second_turns > 20, "{second_turns}");
 }
 
+#[test]
+fn a_dh_table_read_back_is_the_same_machine() {
+    let mut rng = StdRng::seed_from_u64(13);
+    for calibrated in machines() {
+        let machine = calibrated.machine();
+        for format in [Format::Dh, Format::Mdh] {
+            let text = export(&calibrated, format, &ExportOptions::default()).expect("a table").text;
+            let back = read("back.csv", &text, &Ends::default()).expect("sound").machine;
+            assert_eq!(back.name(), machine.name());
+            for _ in 0..20 {
+                let q = commands(machine, &mut rng);
+                // Joints that carry the workpiece stand first, the outermost first: the order of commands differs.
+                let of = |name: &String| {
+                    q[machine.commands().iter().position(|own| own == name).expect("a command")]
+                };
+                let theirs: Vec<f64> = back.commands().iter().map(of).collect();
+                assert_eq!(theirs.len(), q.len());
+                let gap = gap(calibrated.chain().w_from_t(&q), Chain::nominal(&back).w_from_t(&theirs));
+                assert!(gap < 1e-12, "{} {format}: {gap:e}", machine.name());
+            }
+            for (_, joint) in machine.joints() {
+                let own = back.joints().find(|(_, own)| own.name == joint.name).expect("a joint").1;
+                assert_eq!((own.kind, own.travel), (joint.kind, joint.travel));
+            }
+        }
+    }
+}
+
+/// The displacement of every joint of a model that is named as one of the machine, for these commands.
+fn displaced(machine: &Machine, back: &Machine, q: &[f64]) -> Vec<f64> {
+    let all = machine.displacements(q);
+    let of = |name: &String| machine.joints().find(|(_, joint)| joint.name == *name).map(|(j, _)| all[j]);
+    back.commands().iter().map(|name| of(name).expect("a joint of the machine")).collect()
+}
+
+#[test]
+fn a_model_of_mujoco_read_back_is_the_same_machine() {
+    let mut rng = StdRng::seed_from_u64(17);
+    for calibrated in machines() {
+        let machine = calibrated.machine();
+        let exported = export(&calibrated, Format::Mjcf, &ExportOptions::default()).expect("a model");
+        let ends = Ends { base: Some("w".into()), tip: Some("t".into()) };
+        let back = read("back.xml", &exported.text, &ends).expect("sound").machine;
+        assert_eq!(back.commands().len(), machine.joints().count(), "{}", machine.name());
+        for _ in 0..20 {
+            let q = commands(machine, &mut rng);
+            let theirs = displaced(machine, &back, &q);
+            let gap = gap(calibrated.chain().w_from_t(&q), Chain::nominal(&back).w_from_t(&theirs));
+            assert!(gap < 1e-12, "{}: {gap:e}", machine.name());
+        }
+        // Tendons hold joints that follow others; each leader is there with its factor.
+        for (_, joint) in machine.joints().filter(|(_, joint)| joint.follows.is_some()) {
+            let own = joint.follows.as_ref().is_some_and(|leaders| leaders.contains_key(&joint.name));
+            let drive = format!("<fixed name=\"drive of {}\">", joint.name);
+            assert_eq!(exported.text.contains(&drive), !own, "{}", joint.name);
+        }
+    }
+}
+
+#[test]
+fn play_is_a_coupling_of_its_width_and_what_mujoco_cannot_hold_is_listed() {
+    let exported = export(&lift(), Format::Mjcf, &ExportOptions::default()).expect("a model");
+    let number = exported.numbers.first().expect("play");
+    assert_eq!((number.name.as_str(), number.unit.as_str()), ("play of z", "m"));
+    assert!((number.value.expect("a width") - 6e-6).abs() < 1e-15, "{number:?}");
+    assert!(
+        exported.text.contains("<fixed name=\"play of z\" limited=\"true\" range=\"-3"),
+        "{}",
+        exported.text
+    );
+    assert_eq!(
+        exported.left_out.iter().map(|left| left.what.as_str()).collect::<Vec<_>>(),
+        ["scale_error at z"]
+    );
+}
+
 /// A lift with a position error and play, as `diagnose` would write them.
 fn lift() -> CalibratedMachine {
     CalibratedMachine::open(folder("tests/exports/lift.ron")).expect("sound")

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use kincal::export::{ExportOptions, Exported, Format, export};
+use kincal::import::{Beside, ImportOptions, read_with};
 use kincal::lie::{Pose, Twist, Vec3};
-use kincal::{CalibratedMachine, Machine};
+use kincal::{CalibratedMachine, Chain, Machine};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
@@ -151,6 +152,29 @@ fn apart(
     largest
 }
 
+/// The machine that `import` makes of a configuration with an exported file.
+fn reimported(out: &Exported) -> Machine {
+    let module = out.told[0].split([' ', ';']).nth(2).expect("a module");
+    let ini = format!("[KINS]\nKINEMATICS = {module}\n[TRAJ]\nLINEAR_UNITS = mm\n");
+    let mut options = ImportOptions::default();
+    options.tool_length = TOOL;
+    options.hal = vec!["machine.hal".into()];
+    options.beside = vec![Beside { file: "machine.hal".into(), text: out.text.clone() }];
+    read_with("machine.ini", &ini, &options).expect("sound").machine
+}
+
+/// Its tip as the module has it, mm and deg.
+fn world(machine: &Machine, rotary: [&'static str; 2]) -> impl Fn([f64; 3], [f64; 2]) -> [f64; 3] {
+    move |j, angles| {
+        let of = |name: &String| match rotary.iter().position(|own| own == name) {
+            Some(k) => angles[k].to_radians(),
+            None => ["x", "y", "z"].iter().position(|own| own == name).map_or(0.0, |k| j[k] * 1e-3),
+        };
+        let q: Vec<f64> = machine.commands().iter().map(of).collect();
+        Chain::nominal(machine).w_from_t(&q).translation.0.map(|x| 1e3 * x)
+    }
+}
+
 #[test]
 fn linuxcnc_with_our_numbers_has_the_tool_tip_of_the_model_where_it_can() {
     // Rounding of metres in double precision, a thousandth of a nanometre.
@@ -164,6 +188,8 @@ fn linuxcnc_with_our_numbers_has_the_tool_tip_of_the_model_where_it_can() {
     let o = [0.0, value(&out, "y-offset"), value(&out, "z-offset") + dt];
     let gap = apart(&ac, [("a", 1.0), ("c", 1.0)], |j, [a, c]| trt(0, p, o, j, a, c));
     assert!(gap < SAME, "{gap:e}");
+    let gap = apart(&ac, [("a", 1.0), ("c", 1.0)], world(&reimported(&out), ["a", "c"]));
+    assert!(gap < SAME, "{gap:e}");
     assert!(out.left_out.is_empty(), "{:?}", out.left_out);
 
     let shifts = [("b", [0.05, -0.03, 0.02]), ("c", [0.04, 0.06, -0.03]), ("t", [0.01, 0.02, 0.03])];
@@ -173,12 +199,16 @@ fn linuxcnc_with_our_numbers_has_the_tool_tip_of_the_model_where_it_can() {
     let o = [value(&out, "x-offset"), 0.0, value(&out, "z-offset") + dt];
     let gap = apart(&bc, [("b", 1.0), ("c", 1.0)], |j, [b, c]| trt(1, p, o, j, b, c));
     assert!(gap < SAME, "{gap:e}");
+    let gap = apart(&bc, [("b", 1.0), ("c", 1.0)], world(&reimported(&out), ["b", "c"]));
+    assert!(gap < SAME, "{gap:e}");
 
     let ba = shifted(table_b_a(), &[("b", [0.05, -0.03, 0.02]), ("a", [0.04, 0.06, -0.03])]);
     let out = export(&ba, Format::LinuxCnc, &options()).expect("a module");
     let p = ["x-rot-point", "y-rot-point", "z-rot-point"].map(|pin| value(&out, pin));
     let dz = value(&out, "z-offset");
     let gap = apart(&ba, [("a", 1.0), ("b", 1.0)], |j, [a, b]| tdr(p, dz, dt, j, a, b));
+    assert!(gap < SAME, "{gap:e}");
+    let gap = apart(&ba, [("a", 1.0), ("b", 1.0)], world(&reimported(&out), ["a", "b"]));
     assert!(gap < SAME, "{gap:e}");
 
     let shifts = [("b", [0.02, 0.01, 0.04]), ("t", [0.0, 0.03, 0.01]), ("c", [0.03, -0.05, 0.02])];
@@ -188,12 +218,18 @@ fn linuxcnc_with_our_numbers_has_the_tool_tip_of_the_model_where_it_can() {
     let zero = [value(&out, "machine zero of X"), value(&out, "machine zero of Y"), 0.0];
     let gap = apart(&bc, [("b", -1.0), ("c", 1.0)], |j, [b, c]| bifurcated(l, minus(j, zero), b, c));
     assert!(gap < SAME, "{gap:e}");
+    let back = reimported(&out);
+    let tip = world(&back, ["b", "c"]);
+    let gap = apart(&bc, [("b", -1.0), ("c", 1.0)], |j, angles| tip(minus(j, zero), angles));
+    assert!(gap < SAME, "{gap:e}");
 
     // The head turns against the module, which is told.
     let bc = shifted(shipped("bc_head_head.ron"), &[("b", [-0.05, 0.02, 0.04]), ("t", [0.05, -0.02, 0.01])]);
     let out = export(&bc, Format::LinuxCnc, &options()).expect("a module");
     let l = value(&out, "pivot-length");
     let gap = apart(&bc, [("b", -1.0), ("c", 1.0)], |j, [b, c]| head(l, j, b, c));
+    assert!(gap < SAME, "{gap:e}");
+    let gap = apart(&bc, [("b", -1.0), ("c", 1.0)], world(&reimported(&out), ["b", "c"]));
     assert!(gap < SAME, "{gap:e}");
     assert!(out.told.iter().any(|line| line.starts_with("axis b turns against")), "{:?}", out.told);
 }

@@ -1,0 +1,102 @@
+//! A machine from a table of Denavit-Hartenberg parameters stands where the table says.
+
+use std::path::{Path, PathBuf};
+
+use kincal::import::{Ends, Form, ImportOptions, open, open_with, read, read_with};
+use kincal::lie::{Pose, Vec3};
+use kincal::{Chain, Machine};
+
+fn table(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/dh").join(name)
+}
+
+fn shipped(name: &str) -> Machine {
+    Machine::open(Path::new(env!("CARGO_MANIFEST_DIR")).join("machines").join(name)).expect("a machine")
+}
+
+fn as_dh() -> ImportOptions {
+    let mut options = ImportOptions::default();
+    options.form = Some(Form::Dh);
+    options
+}
+
+fn same(a: Pose<f64>, b: Pose<f64>) {
+    let rotation = a.rotation.0.iter().flatten().zip(b.rotation.0.iter().flatten());
+    for (a, b) in rotation.chain(a.translation.0.iter().zip(&b.translation.0)) {
+        assert!((a - b).abs() < 1e-14, "{a} {b}");
+    }
+}
+
+#[test]
+fn the_table_of_a_robot_is_the_machine_that_was_written_by_hand() {
+    let puma = open_with(table("puma560.csv"), &as_dh()).expect("a table").machine;
+    let hand = shipped("puma560.ron");
+    assert_eq!((puma.name(), puma.commands()), ("puma560", hand.commands()));
+    let panda = open(table("panda.csv"), &Ends::default()).expect("a table").machine;
+    assert_eq!(panda.travel(5), (-0.0175, 3.7525));
+    for q in [[0.0; 7], [0.4, -1.0, 0.8, -1.7, 0.3, 2.2, -0.6]] {
+        same(Chain::nominal(&puma).w_from_t(&q[..6]), Chain::nominal(&hand).w_from_t(&q[..6]));
+        let franka = shipped("franka_panda.ron");
+        same(Chain::nominal(&panda).w_from_t(&q), Chain::nominal(&franka).w_from_t(&q));
+    }
+    for c in 0..6 {
+        assert_eq!(puma.travel(c), hand.travel(c));
+    }
+}
+
+#[test]
+fn signs_and_offsets_are_those_of_the_joint() {
+    let gantry = open(table("gantry.csv"), &Ends::default()).expect("a table").machine;
+    let [x, z] = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3);
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let slide = |by: Vec3<f64>| Pose::translation(by);
+    for [lift, turn] in [[0.0, 0.0], [0.3, -1.1]] {
+        let expected = slide(Vec3([0.1, 0.2, 0.3]))
+            * Pose::turn(z, quarter)
+            * slide(z.times(0.5 + 0.02 - lift))
+            * slide(x.times(0.1))
+            * Pose::turn(x, -quarter)
+            * Pose::turn(z, (30.0 - 15.0_f64).to_radians() - turn)
+            * slide(z.times(0.04));
+        same(Chain::nominal(&gantry).w_from_t(&[lift, turn]), expected);
+    }
+}
+
+#[test]
+fn a_table_is_of_the_convention_that_it_states() {
+    let error = open_with(table("panda.csv"), &as_dh()).expect_err("Craig");
+    assert!(
+        error.to_string().ends_with("panda.csv:1: the table says that it is of --mdh, not of --dh"),
+        "{error}"
+    );
+    let mut options = as_dh();
+    options.ends = Ends { base: None, tip: Some("q6".into()) };
+    let error = open_with(table("puma560.csv"), &options).expect_err("no links");
+    assert!(error.mend().contains("# tool[m,rad]"), "{}", error.mend());
+}
+
+#[test]
+fn what_the_table_does_not_say_is_told() {
+    let text = "a_m,alpha_rad,d_m\n0,pi/2,1\n1,0,0\n";
+    let imported = read_with("my arm.csv", text, &as_dh()).expect("a table");
+    assert_eq!(
+        (imported.machine.name(), imported.machine.commands()),
+        ("my_arm", &["q1".into(), "q2".into()][..])
+    );
+    let told = imported.told.join("\n");
+    assert!(told.contains("they are called q1, q2") && told.contains("all are taken as rotary"), "{told}");
+    insta::assert_snapshot!(imported.text);
+}
+
+#[test]
+fn no_beginning_of_a_table_and_no_gap_in_it_makes_the_reader_panic() {
+    for name in ["puma560.csv", "panda.csv", "gantry.csv"] {
+        let text = std::fs::read_to_string(table(name)).expect("a file");
+        for at in (0..text.len()).filter(|at| text.is_char_boundary(*at)) {
+            let _ = read(name, &text[..at], &Ends::default());
+            let _ = read_with(name, &text[at..], &as_dh());
+            let rest = (at + 5..=text.len()).find(|end| text.is_char_boundary(*end)).unwrap_or(text.len());
+            let _ = read_with(name, &format!("{}{}", &text[..at], &text[rest..]), &as_dh());
+        }
+    }
+}
