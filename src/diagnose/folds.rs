@@ -95,6 +95,15 @@ fn is_one_motion(a: &[Option<(f64, f64)>], b: &[Option<(f64, f64)>]) -> bool {
     a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| is_near(a, b))
 }
 
+/// Whether stretches that were left out are foretold better by these effects than by others, by more than one standard error.
+pub(super) fn are_better(search: &Search, these: &[ModelTerm], others: &[ModelTerm]) -> bool {
+    let Some(folds) = Folds::new(search, &[these, others].concat()) else { return false };
+    let of_others = folds.left_out(search, &|effect| effect >= these.len());
+    let (fall, error) =
+        folds.fall(search, &of_others, &folds.left_out(search, &|effect| effect < these.len()));
+    fall > error
+}
+
 /// Which part of the squares of left-out stretches is left with all effects, against what the first of them leave; each quantity in units of
 /// its mean with these. `None` where there are too few rows.
 pub(super) fn remaining(search: &Search, in_model: &[ModelTerm], first: usize) -> Option<f64> {

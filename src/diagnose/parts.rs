@@ -52,9 +52,20 @@ const TRIES: usize = 6;
 /// Whether stretches that were left out are foretold better with term `i` of these, and whole recordings where there are several, each by
 /// more than one standard error of that.
 pub(super) fn is_foretold(search: &Search, all: &[ModelTerm], i: usize) -> bool {
-    let is_more = |(gain, error): (f64, f64)| gain > error;
-    folds::gain(search, all, i).is_some_and(is_more)
-        && folds::gain_elsewhere(search, all, i).is_none_or(is_more)
+    standard_errors(search, all, i) > 1.0
+}
+
+/// By how many standard errors both are foretold better with term `i`: the fewer of the two.
+fn standard_errors(search: &Search, all: &[ModelTerm], i: usize) -> f64 {
+    let by = |(gain, error): (f64, f64)| gain / error.max(f64::MIN_POSITIVE);
+    let own = folds::gain(search, all, i).map_or(f64::NEG_INFINITY, by);
+    folds::gain_elsewhere(search, all, i).map_or(own, by).min(own)
+}
+
+/// Of the terms that are not foretold so, the one that is so least.
+pub(super) fn least_foretold(search: &Search, all: &[ModelTerm]) -> Option<usize> {
+    let each: Vec<f64> = (0..all.len()).map(|i| standard_errors(search, all, i)).collect();
+    (0..all.len()).filter(|i| each[*i] <= 1.0).min_by(|a, b| each[*a].total_cmp(&each[*b]))
 }
 
 /// Free functions as candidates, beside the families of a search: what is no name for all that is there may be one for a part of it.

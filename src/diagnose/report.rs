@@ -14,7 +14,7 @@ use super::odds::{Odds, confusable, odds, trust};
 use super::orders;
 use super::outbid::outbid;
 use super::outliers;
-use super::parts::{Unnamed, UnnamedPart};
+use super::parts::{Unnamed, UnnamedPart, least_foretold};
 use super::placebo::{Placebo, placebo};
 use super::search::{Hypothesis, ModelTerm, Search, all_but};
 use super::series::Standing;
@@ -73,16 +73,23 @@ pub(super) fn report(
     noise: &[Noise],
 ) -> Diagnosis {
     let linear = search.rows.linear;
-    let shares = search.shares(in_model);
+    let mut shares = search.shares(in_model);
     let mut doubt = match doubt(search, in_model, machine, &shares, noise) {
         Some(Doubt { but: Some(i), .. }) => {
             return report(search, &in_model[i..=i], (machine, library, facts), noise);
         }
         doubt => doubt,
     };
+    // Where names do not explain all that is there, they stand if they foretell more than what has no name does.
+    let proved = doubt.as_ref().and_then(|_| proved(search, in_model, machine, facts));
+    let is_proved = proved.is_some();
+    let in_model = proved.as_deref().unwrap_or(in_model);
+    if is_proved {
+        shares = search.shares(in_model);
+    }
     let mut told: Vec<(usize, Finding, Named)> = match doubt {
-        Some(_) => Vec::new(),
-        None => {
+        Some(_) if !is_proved => Vec::new(),
+        _ => {
             let model = Model::new(search, in_model);
             let one = |i| finding(search, in_model, i, &shares, (machine, library), &model);
             (0..in_model.len()).filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
@@ -95,7 +102,6 @@ pub(super) fn report(
             .as_ref()
             .map(|placebo| Meaningless { cause: placebo.cause.clone(), share: placebo.share });
     }
-    let is_outdone = |placebo: &Option<Placebo>| placebo.as_ref().is_some_and(|p| p.ahead > OUTDONE);
     let place = |i: &usize| search.candidates[in_model[*i].candidate].place;
     // What is said at a place beside a name for nothing is the rest of a patchwork.
     let empty: Vec<Place> = (told.iter().zip(&placebos))
@@ -173,11 +179,12 @@ pub(super) fn report(
             parts = shown;
         }
         let found = search.beside_names(&known);
-        let doubt = match naming.told.is_empty() {
-            true => Some(doubt),
-            false => still(search, &found, doubt, !shown_parts.is_empty()),
+        let is_named = is_proved || !naming.told.is_empty();
+        let doubt = match is_named {
+            true => still(search, &found, doubt, !shown_parts.is_empty()),
+            false => Some(doubt),
         };
-        let left = if naming.told.is_empty() { &search.base } else { &found };
+        let left = if is_named { &found } else { &search.base };
         unexplained = doubt.map(|doubt| unexplained_by(search, machine, noise, &doubt, left));
         if let Some(unexplained) = &mut unexplained {
             unexplained.take(shown_parts);
@@ -270,6 +277,44 @@ fn promoted(
         asked.is_some()
     });
     Some(Told { term: term.clone(), finding, named, placebo: None })
+}
+
+/// The effects that foretell stretches that were left out, each beside the others, where all of them together leave no more than half of
+/// the squares there; unless parts in their place foretell these better, by more than one standard error, `docs/diagnosis-method.md` (81).
+fn proved(
+    search: &Search,
+    in_model: &[ModelTerm],
+    machine: &Machine,
+    facts: &RecordingFacts,
+) -> Option<Vec<ModelTerm>> {
+    // No other recording has this one's clock.
+    let lasting = in_model.iter().filter(|effect| !search.goes_by_clock(effect.candidate));
+    let mut names: Vec<ModelTerm> = lasting.cloned().collect();
+    let is_empty = |names: &[ModelTerm], i: usize| {
+        is_outdone(&placebo(search, names, i, machine)) || says_no_more(search, names, i)
+    };
+    let worst = |names: &[ModelTerm]| {
+        least_foretold(search, names).or_else(|| (0..names.len()).find(|i| is_empty(names, *i)))
+    };
+    while let Some(i) = worst(&names) {
+        names.remove(i);
+    }
+    if folds::remaining(search, &names, 0).is_none_or(|part| part > HALF) {
+        return None;
+    }
+    let unnamed = Unnamed::beside(search, machine, facts);
+    let rows = unnamed.rows(search);
+    let search = unnamed.search(search, &rows);
+    let (parts, _) = unnamed.parts(&search, &[]);
+    // Parts that are these names and more say nothing against them.
+    let is_among = |name: &ModelTerm| parts.iter().any(|part| part.candidate == name.candidate);
+    let stand = names.iter().all(is_among) || !folds::are_better(&search, &parts, &names);
+    stand.then_some(names)
+}
+
+/// Whether a meaningless cause does better.
+fn is_outdone(placebo: &Option<Placebo>) -> bool {
+    placebo.as_ref().is_some_and(|placebo| placebo.ahead > OUTDONE)
 }
 
 /// What is still without a name when names were found for a part of it.
