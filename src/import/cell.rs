@@ -77,6 +77,7 @@ pub(super) fn terms(text: &str) -> Option<Vec<Term>> {
                 sign = if word == "-" { -1.0 } else { 1.0 };
                 wants_sign = false;
             }
+            "+" | "-" => return None,
             _ if wants_sign => return None,
             _ => match word.parse::<f64>() {
                 Ok(x) if factor.is_none() && x.is_finite() => factor = Some(x),
