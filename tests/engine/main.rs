@@ -2,6 +2,10 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+// Recordings of real machines and tables of other programs, which stand beside the project and not in it. One program with the others, since
+// each is linked with the whole library.
+#[path = "../real/mod.rs"]
+mod data_sets;
 #[path = "../blind/mod.rs"]
 mod harness;
 
