@@ -43,6 +43,7 @@ fn left_by_geometry(case: &Case, folder: &Path) -> f64 {
 }
 
 #[test]
+#[ignore = "long: cases are drawn and written twice"]
 fn the_same_seed_writes_the_same_cases() {
     let machines = harness::machines();
     let text = |name: &str| {
@@ -70,6 +71,7 @@ fn constant_geometry_explains_clean_cases_to_their_noise() {
 }
 
 #[test]
+#[ignore = "long: cases of both kinds are drawn and simulated"]
 fn a_concealed_effect_stands_above_the_noise_as_its_ratio_says() {
     let machines = harness::machines();
     for number in 0..10 {
