@@ -198,6 +198,9 @@ pub enum Which {
     First,
     /// The last, which carries no other.
     Last,
+    /// Joints that carry one rotary joint at most, so that what weighs on them is nearly one body: the last two of a wrist, a head, a
+    /// table that tilts.
+    Outer,
 }
 
 /// How time runs through the recordings of a call.

@@ -1,7 +1,7 @@
 //! Where on a machine an effect sits.
 
 use super::family::{Family, Partner, Seat, Which};
-use crate::machine::{JointKind, Machine};
+use crate::machine::{Joint, JointKind, Machine};
 
 /// Where an effect sits on a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -60,6 +60,11 @@ pub(super) fn places(family: &Family, machine: &Machine) -> Vec<Place> {
         Which::All => true,
         Which::First => machine.joints().all(|(k, _)| k >= j || !along(j, k)),
         Which::Last => (j + 1..machine.dyads().len()).all(|k| !along(j, k)),
+        Which::Outer => {
+            let turns =
+                |(k, joint): &(usize, &Joint)| *k > j && along(j, *k) && joint.kind == JointKind::Revolute;
+            machine.joints().filter(turns).count() <= 1
+        }
     };
     for (j, _) in machine.joints().filter(|(j, joint)| sits(joint.kind) && here(*j)) {
         let Some(partner) = family.partner else {
