@@ -3,6 +3,8 @@
 //! A [`Chain`] is a machine whose constant part, `M_j exp(dh_j)`, has been multiplied out once. A [`Sweep`] is that chain at one
 //! vector of commands; from it come poses and, by carrying one wrench along the chain, the row of any scalar measurement.
 
+use std::sync::OnceLock;
+
 use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{Branch, Drive, JointKind, Machine};
 use crate::scalar::Scalar;
@@ -19,6 +21,8 @@ pub(crate) use path::{Moved, Path};
 pub struct Chain<S> {
     links: Vec<Link<S>>,
     workpiece_count: usize,
+    /// Laid out when it is first asked for; of a chain of numbers alone.
+    path: OnceLock<Path>,
 }
 
 #[derive(Clone, Debug)]
@@ -47,6 +51,16 @@ impl Chain<f64> {
     pub fn nominal(machine: &Machine) -> Self {
         Self::new(machine, &vec![Twist::zero(0.0); machine.dyads().len()])
     }
+
+    /// [`Chain::w_from_t`], for a chain that is asked many times.
+    pub(crate) fn tool_pose(&self, q: &[f64]) -> Pose<f64> {
+        self.path().pose_at(q)
+    }
+
+    /// The way from the workpiece to the tool, laid out once.
+    pub(crate) fn path(&self) -> &Path {
+        self.path.get_or_init(|| Path::new(self))
+    }
 }
 
 impl<S: Scalar> Chain<S> {
@@ -68,12 +82,14 @@ impl<S: Scalar> Chain<S> {
         Chain {
             links: deviations.iter().enumerate().map(link).collect(),
             workpiece_count: machine.workpiece_count(),
+            path: OnceLock::new(),
         }
     }
 
     /// Replaces the whole initial pose of one frame, deviation included.
     pub fn set_previous_from_frame(&mut self, j: usize, previous_from_frame: Pose<S>) {
         self.links[j].previous_from_frame = previous_from_frame;
+        self.path.take();
     }
 
     /// Takes every initial pose, deviations included, from a chain of the same machine; nothing is carried behind the joints.
@@ -82,11 +98,13 @@ impl<S: Scalar> Chain<S> {
             link.previous_from_frame = other.previous_from_frame;
             link.carried = None;
         }
+        self.path.take();
     }
 
     /// Puts a deviation behind the joint of dyad `j`: `T = M_j exp(dh_j) exp(xi_j q_j) exp(e_j)`, `docs/model.md` (30).
     pub fn set_carried(&mut self, j: usize, carried: Pose<S>) {
         self.links[j].carried = Some(carried);
+        self.path.take();
     }
 
     /// `M_j exp(dh_j)` of dyad `j`.

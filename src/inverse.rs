@@ -13,11 +13,15 @@ use rand::SeedableRng;
 use rand::rngs::StdRng;
 use serde::{Deserialize, Serialize};
 
-use crate::chain::{Chain, Sweep};
+use crate::chain::{Chain, Moved};
 use crate::check::random_command;
-use crate::lie::{Pose, Twist, Vec3, Wrench};
+use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use directions::{Direction, Equations, MOST, norm};
+
+/// Equations whose weakest direction is stronger than this part of the strongest are solved as they stand, to eleven digits; a Newton step
+/// needs fewer.
+const SURE: f64 = 1e-2;
 
 /// What of the goal counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -162,7 +166,19 @@ struct Look {
     gap_w: Vec3<f64>,
     /// The turn that is missing, as a rotation vector in `w`, rad.
     turn_w: Vec3<f64>,
-    sweep: Sweep<f64>,
+    /// What each command does to the tip by its speed: the point of the tip, and the tool's turning, in `w`.
+    speeds: Vec<Twist<f64>>,
+}
+
+/// One equation for each of `count`: what it makes of the speeds of the free commands.
+fn rows(look: &Look, count: usize, free: &[bool], of: impl Fn(usize, &Twist<f64>) -> f64) -> Equations {
+    let mut equations = Equations::new(count, free.len());
+    for k in 0..count {
+        let speeds = look.speeds.iter().zip(free);
+        let row = speeds.map(|(speed, free)| if *free { of(k, speed) } else { 0.0 });
+        equations.row_mut(k).iter_mut().zip(row).for_each(|(x, by)| *x = by);
+    }
+    equations
 }
 
 fn unit(k: usize) -> Vec3<f64> {
@@ -249,7 +265,7 @@ impl<'a> Inverse<'a> {
             let q: Vec<f64> = (0..count).map(|c| random_command(&self.machine, c, &mut rng)).collect();
             let look = self.look(&chain, &goal, &q);
             let (turns, shifts) = (self.turn_rows(&look, &free), self.shift_rows(&look, &free));
-            best.3 |= rank(self.by_slides(&shifts)) == 3;
+            best.3 |= rank(self.by_slides(shifts.clone())) == 3;
             best.0 = best.0.max(rank(shifts.clone().and(&turns)));
             best.1 = best.1.max(rank(turns));
             best.2 = best.2.max(rank(shifts));
@@ -258,8 +274,15 @@ impl<'a> Inverse<'a> {
     }
 
     fn look(&self, chain: &Chain<f64>, goal: &Goal, q: &[f64]) -> Look {
-        let sweep = chain.sweep(q);
-        let tip = sweep.w_from_t() * goal.t_from_tip;
+        let (path, count) = (chain.path(), self.machine.commands().len());
+        let mut moved = vec![Moved::none(0.0); path.joint_count()];
+        path.go_to(q, &mut moved);
+        let still = Twist::zero(0.0);
+        let mut velocities = vec![still; path.joint_count()];
+        let tip = path.velocities(goal.t_from_tip.translation, &moved, &mut velocities);
+        let tip = Pose { rotation: tip.rotation * goal.t_from_tip.rotation, ..tip };
+        let mut speeds = vec![still; count];
+        path.by_command(&velocities, &mut speeds);
         let gap_w = goal.w_from_tip.translation - tip.translation;
         let turn_w = match self.mode {
             Mode::Position => Vec3([0.0; 3]),
@@ -281,17 +304,16 @@ impl<'a> Inverse<'a> {
                 }
             }
         };
-        Look { tip, gap_w, turn_w, sweep }
+        Look { tip, gap_w, turn_w, speeds }
     }
 
     fn shift_rows(&self, look: &Look, free: &[bool]) -> Equations {
-        let wrenches = [0, 1, 2].map(|k| Wrench::at_point(unit(k), look.tip.translation));
-        self.rows(look, &wrenches, free)
+        rows(look, 3, free, |k, speed| speed.v.0[k])
     }
 
     fn turn_rows(&self, look: &Look, free: &[bool]) -> Equations {
         let (directions, count) = self.turn_directions(look);
-        self.rows(look, &directions.map(Wrench::couple)[..count], free)
+        rows(look, count, free, |k, speed| directions[k].dot(speed.w))
     }
 
     /// The turns that count, in `w`, and how many.
@@ -315,18 +337,8 @@ impl<'a> Inverse<'a> {
         left
     }
 
-    fn rows(&self, look: &Look, wrenches: &[Wrench<f64>], free: &[bool]) -> Equations {
-        let mut equations = Equations::new(wrenches.len(), free.len());
-        for (k, wrench) in wrenches.iter().enumerate() {
-            let row = equations.row_mut(k);
-            look.sweep.command_row(&self.machine, *wrench, row);
-            row.iter_mut().zip(free).filter(|(_, free)| !**free).for_each(|(x, _)| *x = 0.0);
-        }
-        equations
-    }
-
     /// What linear joints do.
-    fn by_slides(&self, equations: &Equations) -> Equations {
+    fn by_slides(&self, equations: Equations) -> Equations {
         equations.only(|c| self.machine.command_joint(c).kind == JointKind::Prismatic)
     }
 
@@ -437,17 +449,24 @@ impl<'a> Inverse<'a> {
         let turns = self.turn_rows(look, free);
         let mut step = vec![0.0; q.len()];
         if self.mode == Mode::Pose && !self.by_slides {
-            let directions = shifts.and(&turns).directions();
-            let weak = 0.05 * weak * directions.largest();
-            directions.step(&self.all_left(look), &from_start, weak, &mut step);
+            let (all, left) = (shifts.and(&turns), self.all_left(look));
+            if !all.step_if_strong(&left, (0.05 * weak, 0.0), &mut step) {
+                let directions = all.directions();
+                let weak = 0.05 * weak * directions.largest();
+                directions.step(&left, &from_start, weak, &mut step);
+            }
             return step;
         }
         let mut strong: Vec<Direction> = Vec::new();
         if turns.count() > 0 {
-            let directions = turns.directions();
-            directions.step(&self.turn_left(look), &from_start, weak, &mut step);
-            strong = directions.parts;
-            strong.retain(|part| part.size >= weak);
+            let left = self.turn_left(look);
+            let is_enough = self.by_slides || self.mode == Mode::Axis;
+            if !(is_enough && turns.step_if_strong(&left, (0.0, weak), &mut step)) {
+                let directions = turns.directions();
+                directions.step(&left, &from_start, weak, &mut step);
+                strong = directions.parts;
+                strong.retain(|part| part.size >= weak);
+            }
         }
         if self.mode == Mode::Axis {
             return step;
@@ -456,8 +475,11 @@ impl<'a> Inverse<'a> {
         let mut gap = shift_left(look);
         gap.iter_mut().zip(moved).for_each(|(gap, moved)| *gap -= moved);
         if self.by_slides {
-            let none = vec![0.0; q.len()];
-            self.by_slides(&shifts).directions().step(&gap, &none, 0.0, &mut step);
+            let slides = self.by_slides(shifts);
+            if !slides.step_if_strong(&gap, (SURE, 0.0), &mut step) {
+                let none = vec![0.0; q.len()];
+                slides.directions().step(&gap, &none, 0.0, &mut step);
+            }
             return step;
         }
         // What the orientation does not need.

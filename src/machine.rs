@@ -111,6 +111,8 @@ pub struct Machine {
     dyads: Vec<Dyad>,
     workpiece_count: usize,
     commands: Vec<String>,
+    /// Index of the dyad of each command's joint.
+    command_dyads: Vec<usize>,
     drives: Vec<Option<Drive>>,
     side_branches: Vec<SideBranch>,
 }
@@ -157,6 +159,7 @@ impl Machine {
             dyads,
             workpiece_count,
             commands: Vec::new(),
+            command_dyads: Vec::new(),
             drives: Vec::new(),
             side_branches: Vec::new(),
         };
@@ -261,9 +264,7 @@ impl Machine {
 
     /// The joint that a command moves (itself; others may follow it), by index of [`Machine::commands`].
     pub fn command_joint(&self, command: usize) -> &Joint {
-        let name = &self.commands[command];
-        let joints = self.dyads.iter().filter_map(|d| d.joint.as_ref());
-        joints.into_iter().find(|j| j.name == *name).expect("every command is a joint's name")
+        self.dyads[self.command_dyads[command]].joint.as_ref().expect("every command is a joint's name")
     }
 
     /// How the displacement of dyad `j`'s joint follows from the commands; `None` for a frame without joint.

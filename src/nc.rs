@@ -43,6 +43,7 @@ mod vocabulary;
 mod dialects;
 
 // A line and its pieces.
+mod address;
 mod codes;
 mod number;
 
@@ -68,12 +69,14 @@ mod effects;
 
 mod state;
 
+pub use address::Address;
 pub use block::Block;
 pub use dialect::Dialect;
 pub use fault::NcFault;
 pub use modes::{Coordinate, Distance, Feed, Modes, MotionKind, Plane, Units, Why};
 pub use motion::{Motion, Step};
 pub use number::Number;
+pub(crate) use number::fixed;
 pub use program::{LONGEST_LINE, Program};
 pub use state::State;
 pub use token::{Kind, Token};

@@ -36,7 +36,7 @@ pub struct Batch {
 impl Batch {
     /// Lays out a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
-        Batch { path: Path::new(chain) }
+        Batch { path: chain.path().clone() }
     }
 
     /// `w_from_t`, `docs/model.md` (10), at every row of `commands`, m or rad: twelve columns, the first three rows of the 4 × 4 matrix one

@@ -10,6 +10,9 @@ use crate::scalar::Scalar;
 
 use super::Chain;
 
+/// Displacements of as many joints need no memory of their own.
+const FEW_JOINTS: usize = 16;
+
 /// What has to be known of a machine's constants to walk along it, many times.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
@@ -181,10 +184,30 @@ impl Path {
         Pose { rotation: Mat3([x.0, y.0, z.0]).transpose(), translation: p }
     }
 
+    /// [`Path::w_from_t`] at the commands `q`, m or rad.
+    pub fn pose_at(&self, q: &[f64]) -> Pose<f64> {
+        let none = Moved::none(0.0);
+        let (mut few, mut many) = ([none; FEW_JOINTS], Vec::new());
+        let moved = match few.get_mut(..self.joints.len()) {
+            Some(moved) => moved,
+            None => {
+                many.resize(self.joints.len(), none);
+                &mut many
+            }
+        };
+        self.go_to(q, moved);
+        self.w_from_t(moved, 0.0)
+    }
+
     /// Velocity of the point `p_t` of the tool and angular velocity of the tool, both seen from `w`, by the speed of each joint; joints in the
-    /// order of the way, `docs/model.md` (13).
+    /// order of the way, `docs/model.md` (13). Returns the pose in `w` of frame `t` shifted to that point.
     #[inline(always)]
-    pub fn velocities<T: Scalar>(&self, p_t: Vec3<T>, moved: &[Moved<T>], velocities: &mut [Twist<T>]) {
+    pub fn velocities<T: Scalar>(
+        &self,
+        p_t: Vec3<T>,
+        moved: &[Moved<T>],
+        velocities: &mut [Twist<T>],
+    ) -> Pose<T> {
         let like = p_t.0[0];
         let [x, y, z] = Mat3::identity(like).0;
         let (mut here, mut p_w) = ([Vec3(x), Vec3(y), Vec3(z)], Vec3::zero(like));
@@ -211,6 +234,8 @@ impl Path {
                 velocity.v = velocity.w.cross(end_w - velocity.v);
             }
         }
+        let [x, y, z] = here;
+        Pose { rotation: Mat3([x.0, y.0, z.0]).transpose(), translation: end_w }
     }
 
     /// Adds up what belongs to joints by command.

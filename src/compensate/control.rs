@@ -228,7 +228,7 @@ impl<'a> Control<'a> {
 
     /// The tip in frame `w` with the joints at `q`, by the nominal kinematics.
     pub fn tip_pose(&self, q: &[f64]) -> Pose<f64> {
-        self.nominal.w_from_t(q) * self.tip()
+        self.nominal.tool_pose(q) * self.tip()
     }
 
     /// Where tip and tool axis should be with the joints at `q`.
@@ -281,7 +281,7 @@ impl<'a> Control<'a> {
         let mut p = [0.0; 3];
         let back = self.frame.pose().inverse();
         if self.tcp {
-            let tip = (self.nominal.w_from_t(q) * self.t_from_tip(self.length)).translation;
+            let tip = (self.nominal.tool_pose(q) * self.t_from_tip(self.length)).translation;
             p = back.transform(self.w_from_program.inverse().transform(tip)).0;
         } else {
             // An axis that the machine lacks stands where the program says.

@@ -11,10 +11,10 @@ use super::style::{Style, plain};
 use super::tip_error::TipError;
 use crate::calibration::LeftOut;
 use crate::chain::Chain;
-use crate::inverse::{Inverse, Mode, Solution};
+use crate::inverse::{Goal, Inverse, Mode, Solution};
 use crate::lie::Twist;
 use crate::machine::{JointKind, Machine};
-use crate::nc::{Block, Dialect, How, Number, Word};
+use crate::nc::{Block, Dialect, How, Number, Word, fixed};
 
 /// A number to write for an axis.
 #[derive(Clone)]
@@ -38,12 +38,18 @@ impl AxisNumber {
 /// What a position needs.
 #[derive(Clone)]
 pub(super) struct Correction {
+    goal: Goal,
     numbers: Vec<AxisNumber>,
     written: Position,
     solution: Solution,
 }
 
 impl Correction {
+    /// Where tip and tool axis should be.
+    pub fn goal(&self) -> &Goal {
+        &self.goal
+    }
+
     /// Numbers that differ from what stands there.
     pub fn numbers(&self) -> &[AxisNumber] {
         &self.numbers
@@ -128,36 +134,40 @@ impl<'a> Corrector<'a> {
         if last.piece == self.model.piece() {
             return None;
         }
-        let (_, again) = self.settle(program, &last.meant, &program.free());
         let control = program.control();
+        let (_, again) = self.settle(&control.goal(&last.meant), &last.meant, &program.free());
         Some(TipError::between(control.tip_pose(&last.sent), control.tip_pose(&again.commands)))
     }
 
     /// What the model says is wrong where the program means `meant` and the joints are sent to `sent`.
     pub fn error(&self, control: &Control, sent: &[f64], meant: &[f64]) -> TipError {
-        let goal = control.goal(meant);
-        TipError::between(self.model.chain_at(sent).w_from_t(sent) * goal.t_from_tip, goal.w_from_tip)
+        self.error_from(&control.goal(meant), sent)
+    }
+
+    /// What the model says is wrong where the joints are sent to `sent`.
+    pub fn error_from(&self, goal: &Goal, sent: &[f64]) -> TipError {
+        TipError::between(self.model.chain_at(sent).tool_pose(sent) * goal.t_from_tip, goal.w_from_tip)
     }
 
     /// The chain that holds where the joints are sent so that tip and axis are where `meant` has them, and those joint commands. Errors
     /// belong to the position that is sent, which the correction itself moves a little.
-    fn settle(&self, program: &Interpreter, meant: &[f64], free: &[bool]) -> (Cow<'_, Chain<f64>>, Solution) {
+    fn settle(&self, goal: &Goal, meant: &[f64], free: &[bool]) -> (Cow<'_, Chain<f64>>, Solution) {
         let mut chain = self.model.chain_at(meant);
-        let mut solution = self.solve_with(&chain, program, meant, free);
+        let mut solution = self.inverse.solve(&chain, goal, meant, free);
         for _ in 0..SETTLING {
             let there = self.model.chain_at(&solution.commands);
             if matches!(there, Cow::Borrowed(_)) {
                 break;
             }
             chain = there;
-            solution = self.solve_with(&chain, program, meant, free);
+            solution = self.inverse.solve(&chain, goal, meant, free);
         }
         (chain, solution)
     }
 
     /// The joint commands that bring tip and axis of the actual machine where `meant` has them.
     pub fn sent(&self, program: &Interpreter, meant: &[f64]) -> Vec<f64> {
-        self.settle(program, meant, &program.free()).1.commands
+        self.settle(&program.control().goal(meant), meant, &program.free()).1.commands
     }
 
     /// The joint commands that bring tip and axis of a machine with this chain where `meant` has them, with these commands free.
@@ -183,16 +193,17 @@ impl<'a> Corrector<'a> {
     ) -> Correction {
         let control = program.control();
         let free = program.free();
-        let (chain, solution) = self.settle(program, q, &free);
+        let goal = control.goal(q);
+        let (chain, solution) = self.settle(&goal, q, &free);
         let mut exact = solution.commands.clone();
-        let mut numbers = Vec::new();
+        let (slip, mut numbers) = (control.slip(), Vec::new());
         let mut coordinates = program.written().program().to_vec();
         let word = |i: usize| block.zip(words.get(i).copied().flatten()).map(|(b, w)| &b.words()[w]);
         let rotary = |i: usize| control.axes()[i].is_rotary();
         // Angles first; lengths then make up for what rounding does to them.
         let turned = control.program(&exact, &coordinates);
         for i in (0..coordinates.len()).filter(|i| rotary(*i)) {
-            coordinates[i] = number(program, style, i, turned[i], word(i), &mut numbers);
+            coordinates[i] = number((program, style), (i, slip[i]), turned[i], word(i), &mut numbers);
         }
         if (0..coordinates.len()).any(rotary) {
             let mut rounded = turned;
@@ -202,7 +213,7 @@ impl<'a> Corrector<'a> {
             if let Some(there) = control.joints(&rounded, &exact) {
                 let slides: Vec<bool> = (0..free.len()).map(|c| free[c] && self.is_prismatic(c)).collect();
                 if slides.iter().filter(|s| **s).count() == 3 {
-                    exact = self.slides.solve(&chain, &control.goal(q), &there, &slides).commands;
+                    exact = self.slides.solve(&chain, &goal, &there, &slides).commands;
                 } else {
                     exact = there;
                 }
@@ -210,13 +221,13 @@ impl<'a> Corrector<'a> {
         }
         let moved = control.program(&exact, &coordinates);
         for i in (0..coordinates.len()).filter(|i| !rotary(*i)) {
-            coordinates[i] = number(program, style, i, moved[i], word(i), &mut numbers);
+            coordinates[i] = number((program, style), (i, slip[i]), moved[i], word(i), &mut numbers);
         }
         drop(chain);
         let (meant, sent, piece) = (q.to_vec(), solution.commands.clone(), self.model.piece());
         self.last = Some(Corrected { meant, sent, piece });
         let q = control.joints(&coordinates, &exact).unwrap_or(exact);
-        Correction { numbers, written: Position::new(q, coordinates), solution }
+        Correction { goal, numbers, written: Position::new(q, coordinates), solution }
     }
 
     /// Axes that the correction of `q` would move if it were known where they stand; only those asked of by `is_asked`.
@@ -244,7 +255,7 @@ impl<'a> Corrector<'a> {
         }
         // Where they are unknown, what matters is by how much they would be moved.
         let stands = control.program(q, program.written().program());
-        let moved = control.program(&self.settle(program, q, &free).1.commands, &stands);
+        let moved = control.program(&self.settle(&control.goal(q), q, &free).1.commands, &stands);
         let half = |i: usize| 0.5 * control.si(i, 10f64.powi(-(style.places(control, i) as i32))).abs();
         wanted.extend(slides.into_iter().filter(|i| (moved[*i] - stands[*i]).abs() > half(*i)));
         wanted.sort_unstable();
@@ -267,18 +278,16 @@ impl<'a> Corrector<'a> {
 }
 
 /// The number to write for an axis that should stand at `wanted` (program coordinates, m or rad), if
-/// another one than there is; returns where it then stands.
+/// another one than there is; returns where it then stands. `slip`: of the axis, as [`Control::slip`].
 fn number(
-    program: &Interpreter,
-    style: &Style,
-    axis: usize,
+    (program, style): (&Interpreter, &Style),
+    (axis, slip): (usize, f64),
     wanted: f64,
     word: Option<&Word>,
     numbers: &mut Vec<AxisNumber>,
 ) -> f64 {
     let control = program.control();
     let now = program.written().program()[axis];
-    let slip = control.slip()[axis];
     let how = program.meaning(word.map_or(How::Modal, |w| w.how));
     let mut value = control.programmed(axis, wanted - slip);
     let from = control.programmed(axis, now - slip);
@@ -309,7 +318,7 @@ fn number(
             if same || !program.places().is_placed(axis) || control.axes()[axis].command().is_none() {
                 return now;
             }
-            (format!("{value:.places$}"), Dialect::Rs274)
+            (fixed(value, places), Dialect::Rs274)
         }
     };
     let Some(written) = Number::parse(text.as_bytes(), dialect) else { return now };

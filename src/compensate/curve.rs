@@ -49,7 +49,7 @@ pub(super) fn write(
         if correction.numbers().iter().all(|n| motion.words[n.axis()].is_none()) {
             pass.restate(block, motion)?;
             pass.put_words(block, motion, &correction)?;
-            pass.arrive(block, end, correction.into_written())?;
+            pass.arrive(block, end, correction)?;
             return put(block, out);
         }
     }
@@ -112,7 +112,7 @@ fn bends(pass: &Pass, block: &Block, arc: &Arc, count: usize) -> Result<f64> {
         let steps = std::mem::replace(&mut piece, model.piece()) != model.piece();
         if let Some(sent) = control.between(&from, &to, 0.5).filter(|_| !steps) {
             let goal = control.goal(&at(k as f64 - 0.5)?.0);
-            let there = model.chain_at(&q).w_from_t(&sent) * goal.t_from_tip;
+            let there = model.chain_at(&q).tool_pose(&sent) * goal.t_from_tip;
             worst = worst.max(TipError::between(there, goal.w_from_tip).m());
         }
         from = to;

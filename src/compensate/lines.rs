@@ -130,7 +130,7 @@ pub(super) fn write(
                 put_bytes(form.line(text, k, count).as_bytes(), out)?;
             }
         }
-        pass.arrive(block, point, correction.into_written())?;
+        pass.arrive(block, point, correction)?;
     }
     pass.put_in_force(MotionKind::Linear);
     Ok(())

@@ -7,7 +7,7 @@ use crate::nc::Block;
 
 /// A block as it should be written.
 pub(super) fn put(block: &Block, out: &mut dyn Write) -> Result<()> {
-    put_bytes(&block.output(), out)
+    block.write_to(out).map_err(|e| Error::file("output", e))
 }
 
 /// Bytes as they are.

@@ -322,16 +322,17 @@ impl<'a> Pass<'a> {
     ///
     /// # Errors
     /// [`CompensateFault::TooFar`] where it is further off than any machine of these tolerances would be.
-    pub fn arrive(&mut self, block: &Block, meant: Position, written: Position) -> Result<()> {
+    pub fn arrive(&mut self, block: &Block, meant: Position, correction: Correction) -> Result<()> {
         let line = block.line();
         let control = self.program.control();
+        let (goal, written) = (*correction.goal(), correction.into_written());
         // Where an axis stands at a place of the machine, the tip is nowhere that matters.
         if !self.program.places().any_parked() {
-            let left = self.corrector.error(control, written.q(), meant.q());
+            let left = self.corrector.error_from(&goal, written.q());
             self.report.largest_left_m.take(left.m(), line);
             self.report.largest_left_rad.take(left.rad(), line);
         }
-        let correction = TipError::between(control.tip_pose(written.q()), control.tip_pose(meant.q()));
+        let correction = TipError::between(control.tip_pose(written.q()), goal.w_from_tip);
         if let Some(bound_m) = self.envelope.exceeded(control, meant.q(), correction.m()) {
             return refuse(block, 0, CompensateFault::TooFar { by_m: correction.m(), bound_m });
         }

@@ -81,7 +81,7 @@ pub(super) fn write(
         } else {
             None
         };
-    pass.arrive(block, end, correction.into_written())?;
+    pass.arrive(block, end, correction)?;
     put(block, out)?;
     match restored {
         Some(line) => {

@@ -58,7 +58,7 @@ pub(super) fn of(
     for (i, index) in motion.words.iter().enumerate() {
         let Some(index) = *index else { continue };
         let word = &block.words()[index];
-        let address = || word.address.clone();
+        let address = || word.address.to_string();
         let Value::Number(number) = word.value else {
             let text = block.text(&word.value_span).chars().take(40).collect();
             let fault = CompensateFault::Expression { address: address(), text };

@@ -82,7 +82,7 @@ pub(super) fn write(
         }
         pass.report().inserted_words += making_up.split_whitespace().count() as u64;
         put_bytes(making_up.as_bytes(), out)?;
-        pass.arrive(block, point, correction.into_written())?;
+        pass.arrive(block, point, correction)?;
     }
     debug_assert!(motion_word(block).is_none_or(|word| block.words()[word].number() != Some(0.0)));
     Ok(())

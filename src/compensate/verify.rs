@@ -236,7 +236,7 @@ impl Machine for Nominal {
     fn send(&mut self, _: &[f64], _: &[bool]) {}
 
     fn w_from_t(&self, q: &[f64]) -> Pose<f64> {
-        self.0.w_from_t(q)
+        self.0.tool_pose(q)
     }
 }
 
@@ -248,7 +248,7 @@ impl Machine for Actual<'_> {
     }
 
     fn w_from_t(&self, q: &[f64]) -> Pose<f64> {
-        self.0.chain_at(q).w_from_t(q)
+        self.0.chain_at(q).tool_pose(q)
     }
 }
 

@@ -44,14 +44,11 @@ impl Equations {
     }
 
     /// Those commands alone; the columns of the others are zero.
-    pub fn only(&self, counts: impl Fn(usize) -> bool) -> Self {
-        let mut part = self.clone();
-        for (i, value) in part.values.iter_mut().enumerate() {
-            if !counts(i % self.columns) {
-                *value = 0.0;
-            }
+    pub fn only(mut self, counts: impl Fn(usize) -> bool) -> Self {
+        for c in (0..self.columns).filter(|c| !counts(*c)) {
+            (0..self.count).for_each(|k| self.row_mut(k)[c] = 0.0);
         }
-        part
+        self
     }
 
     /// What a step of the commands does to each.
@@ -68,6 +65,54 @@ impl Equations {
             let used = dot(row, along);
             row.iter_mut().zip(along).for_each(|(x, v)| *x -= used * v);
         }
+    }
+
+    /// Adds the smallest step that closes the error, if every direction is stronger than this part of the largest and than this size:
+    /// `Aᵀ (A Aᵀ)⁻¹ e`, which is what [`Directions::step`] comes to there. Otherwise the step stays as it is, and it takes directions to
+    /// say more.
+    pub fn step_if_strong(
+        &self,
+        error: &[f64; MOST],
+        (part, size): (f64, f64),
+        step: &mut [f64],
+    ) -> bool {
+        let n = self.count;
+        // `A Aᵀ = L Lᵀ`, and `L⁻¹`: the squares of its elements add up to the inverse squares of all singular values.
+        let (mut lower, mut inverse, mut trace, mut weakest) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST], 0.0, 0.0);
+        for i in 0..n {
+            for j in 0..=i {
+                let known = dot(&lower[i][..j], &lower[j][..j]);
+                let square = dot(self.row(i), self.row(j)) - known;
+                if i > j {
+                    lower[i][j] = square * inverse[j][j];
+                } else if square > 0.0 {
+                    trace += square + known;
+                    lower[i][i] = square.sqrt();
+                    inverse[i][i] = lower[i][i].recip();
+                } else {
+                    return false;
+                }
+            }
+            for j in 0..i {
+                let sum: f64 = (j..i).map(|k| lower[i][k] * inverse[k][j]).sum();
+                inverse[i][j] = -sum * inverse[i][i];
+            }
+            weakest += dot(&inverse[i][..=i], &inverse[i][..=i]);
+        }
+        let least = (part * part * trace).max(size * size);
+        // Not a number is not strong.
+        if !(weakest * least < 1.0) {
+            return false;
+        }
+        let mut by = [0.0; MOST];
+        for i in 0..n {
+            let y = dot(&inverse[i][..=i], &error[..=i]);
+            (0..=i).for_each(|j| by[j] += inverse[i][j] * y);
+        }
+        for (k, by) in by.iter().enumerate().take(n) {
+            step.iter_mut().zip(self.row(k)).for_each(|(step, x)| *step += by * x);
+        }
+        true
     }
 
     /// Singular values and vectors, by rotations that make the rows square to each other (one-sided Jacobi).

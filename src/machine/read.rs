@@ -137,8 +137,8 @@ impl Machine {
 
     fn work_out_drives(&mut self) -> Checked<()> {
         let commanded = |joint: &Joint| joint.follows.as_ref().is_none_or(|f| f.contains_key(&joint.name));
-        let commands: Vec<String> =
-            self.joints().filter(|(_, j)| commanded(j)).map(|(_, j)| j.name.clone()).collect();
+        let (command_dyads, commands): (Vec<usize>, Vec<String>) =
+            self.joints().filter(|(_, j)| commanded(j)).map(|(j, joint)| (j, joint.name.clone())).unzip();
         let mut drives = vec![None; self.dyads.len()];
         for (j, joint) in self.joints() {
             if joint.follows.as_ref().is_some_and(|leaders| leaders.is_empty()) {
@@ -171,7 +171,7 @@ impl Machine {
         if commands.is_empty() {
             return Err(("tool".into(), MachineFault::NoJoint));
         }
-        (self.commands, self.drives) = (commands, drives);
+        (self.commands, self.command_dyads, self.drives) = (commands, command_dyads, drives);
         Ok(())
     }
 

@@ -21,8 +21,9 @@ pub struct Block {
     bytes: Vec<u8>,
     tokens: Vec<Token>,
     words: Vec<Word>,
-    /// Sorted by start; an insertion has an empty range.
-    edits: Vec<(Range<usize>, String)>,
+    /// Sorted by start; an insertion has an empty range. What stands in the place of each lies in `patches`.
+    edits: Vec<(Range<usize>, Range<usize>)>,
+    patches: String,
 }
 
 impl Block {
@@ -34,7 +35,7 @@ impl Block {
 
     pub(crate) fn of_file(file: Arc<Path>, line: usize, bytes: Vec<u8>, dialect: Dialect) -> Block {
         let (tokens, words) = Cutter::cut(&bytes, dialect);
-        Block { file, line, bytes, tokens, words, edits: Vec::new() }
+        Block { file, line, bytes, tokens, words, edits: Vec::new(), patches: String::new() }
     }
 
     /// Takes numbers without a point at these addresses as counts of a least increment of 0.001 mm or 0.001 deg.
@@ -110,7 +111,7 @@ impl Block {
         let found = self.word(word)?;
         if found.value == Value::Expression {
             let fault = NcFault::Expression {
-                address: found.address.clone(),
+                address: found.address.to_string(),
                 text: short(&self.text(&found.value_span)),
             };
             return Err(self.fault(found.value_span.start, fault));
@@ -118,7 +119,7 @@ impl Block {
         let span = found.value_span.clone();
         self.check_number(span.start, text)?;
         self.edits.retain(|(range, _)| *range != span);
-        self.edit(span, text.to_string());
+        self.edit(span, &[text]);
         Ok(())
     }
 
@@ -131,9 +132,9 @@ impl Block {
     /// [`NcFault::NoSuchWord`], [`NcFault::BadAddress`], [`NcFault::NotPlain`].
     pub fn insert(&mut self, after: usize, address: &str, number: &str) -> Result<()> {
         let end = self.word(after)?.span.end;
-        let text = self.new_word(end, address, number)?;
+        let equals = self.check_word(end, address, number)?;
         let blank = self.separator(after);
-        self.edit(end..end, format!("{blank}{text}"));
+        self.edit(end..end, &[blank, address, equals, number]);
         Ok(())
     }
 
@@ -143,9 +144,9 @@ impl Block {
     /// As [`Block::insert`].
     pub fn insert_before(&mut self, before: usize, address: &str, number: &str) -> Result<()> {
         let start = self.word(before)?.span.start;
-        let text = self.new_word(start, address, number)?;
+        let equals = self.check_word(start, address, number)?;
         let blank = self.separator(before);
-        self.edit(start..start, format!("{text}{blank}"));
+        self.edit(start..start, &[address, equals, number, blank]);
         Ok(())
     }
 
@@ -158,7 +159,7 @@ impl Block {
         let blanks = self.bytes[..span.start].iter().rev().take_while(|b| matches!(b, b' ' | b'\t')).count();
         let range = span.start - blanks..span.end;
         self.edits.retain(|(other, _)| other.start < range.start || other.end > range.end);
-        self.edit(range, String::new());
+        self.edit(range, &[]);
         Ok(())
     }
 
@@ -169,15 +170,14 @@ impl Block {
         if packed { "" } else { " " }
     }
 
-    /// Address and number as a word of this block.
-    fn new_word(&self, end: usize, address: &str, number: &str) -> Result<String> {
+    /// Whether address and number make a word of this block; what stands between them.
+    fn check_word(&self, end: usize, address: &str, number: &str) -> Result<&'static str> {
         let letters = address.bytes().take_while(u8::is_ascii_alphabetic).count();
         if letters == 0 || !address.bytes().all(|b| b.is_ascii_alphanumeric()) {
             return Err(self.fault(end, NcFault::BadAddress { address: short(address) }));
         }
         self.check_number(end, number)?;
-        let equals = if address.len() > 1 { "=" } else { "" };
-        Ok(format!("{address}{equals}{number}"))
+        Ok(if address.len() > 1 { "=" } else { "" })
     }
 
     /// Whether anything was replaced or inserted.
@@ -187,14 +187,8 @@ impl Block {
 
     /// The line as it should be written, with its line end.
     pub fn output(&self) -> Vec<u8> {
-        let mut out = Vec::with_capacity(self.bytes.len() + 16);
-        let mut at = 0;
-        for (range, text) in &self.edits {
-            out.extend_from_slice(&self.bytes[at..range.start]);
-            out.extend_from_slice(text.as_bytes());
-            at = range.end;
-        }
-        out.extend_from_slice(&self.bytes[at..]);
+        let mut out = Vec::with_capacity(self.bytes.len() + self.patches.len());
+        self.write_to(&mut out).expect("memory takes all");
         out
     }
 
@@ -202,8 +196,14 @@ impl Block {
     ///
     /// # Errors
     /// Those of the writer.
-    pub fn write_to(&self, out: &mut impl Write) -> std::io::Result<()> {
-        if self.is_changed() { out.write_all(&self.output()) } else { out.write_all(&self.bytes) }
+    pub fn write_to(&self, out: &mut (impl Write + ?Sized)) -> std::io::Result<()> {
+        let mut at = 0;
+        for (range, text) in &self.edits {
+            out.write_all(&self.bytes[at..range.start])?;
+            out.write_all(&self.patches.as_bytes()[text.clone()])?;
+            at = range.end;
+        }
+        out.write_all(&self.bytes[at..])
     }
 
     /// The place of a byte of this line.
@@ -234,7 +234,10 @@ impl Block {
         }
     }
 
-    fn edit(&mut self, range: Range<usize>, text: String) {
+    fn edit(&mut self, range: Range<usize>, pieces: &[&str]) {
+        let start = self.patches.len();
+        pieces.iter().for_each(|piece| self.patches.push_str(piece));
+        let text = start..self.patches.len();
         let at =
             self.edits.partition_point(|(other, _)| (other.start, other.end) <= (range.start, range.end));
         self.edits.insert(at, (range, text));

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::address::Address;
 use super::codes::{FUNCTIONS, takes_the_rest};
 use super::dialect::Dialect;
 use super::line::{Line, is_blank, of_name, starts_name, starts_number};
@@ -150,7 +151,7 @@ impl Cutter<'_> {
         if end == value {
             return self.push(Kind::Name, start + 1);
         }
-        let address = self.line.upper(start..start + 1);
+        let address = Address::new(&self.line.bytes()[start..=start]);
         self.word(address, How::Modal, value..end, end);
     }
 
@@ -182,7 +183,7 @@ impl Cutter<'_> {
                 if self.line.byte(close) == Some(b'/') && self.line.byte(close + 1) == Some(b'[') {
                     close = self.line.balanced(close + 1);
                 }
-                return self.word(name[..1].to_string(), How::Modal, start + 1..close, close);
+                return self.word(Address::new(&name.as_bytes()[..1]), How::Modal, start + 1..close, close);
             }
             let mut close = self.line.balanced(end);
             while self.line.byte(close) == Some(b'[') {
@@ -212,16 +213,16 @@ impl Cutter<'_> {
         if end == letters {
             self.push(Kind::Name, letters + usize::from(signed));
         } else if incremental {
-            self.word(name[1..].to_string(), How::Incremental, letters..end, end);
+            self.word(Address::new(&name.as_bytes()[1..]), How::Incremental, letters..end, end);
         } else {
-            self.word(name, How::Modal, letters..end, end);
+            self.word(Address::new(name.as_bytes()), How::Modal, letters..end, end);
         }
         true
     }
 
     /// An address that ends at `end`, and `=` at `equals`.
     fn assigned(&mut self, end: usize, equals: usize) {
-        let address = self.line.upper(self.at..end);
+        let address = Address::new(&self.line.bytes()[self.at..end]);
         let value = self.line.blanks(equals + 1);
         let value_end = self.line.expression(value);
         if value_end == value {
@@ -279,7 +280,7 @@ impl Cutter<'_> {
     }
 
     /// A word from here to `end`.
-    fn word(&mut self, address: String, how: How, value_span: Range<usize>, end: usize) {
+    fn word(&mut self, address: Address, how: How, value_span: Range<usize>, end: usize) {
         let value = Number::parse(&self.line.bytes()[value_span.clone()], self.line.dialect())
             .map_or(Value::Expression, Value::Number);
         let span = self.at..end;

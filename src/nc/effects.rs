@@ -69,7 +69,6 @@ impl<'a> Effects<'a> {
             .enumerate()
             .peekable();
         while let Some((index, token)) = tokens.next() {
-            let next = tokens.peek().map(|(_, t)| block.text(&t.span).to_ascii_uppercase());
             let name = match token.kind {
                 Kind::Name | Kind::Call => block.name(token),
                 Kind::Other => {
@@ -78,6 +77,7 @@ impl<'a> Effects<'a> {
                 }
                 _ => continue,
             };
+            let next = tokens.peek().map(|(_, t)| block.text(&t.span).to_ascii_uppercase());
             if self.dialect == Dialect::Heidenhain {
                 self.heidenhain(&name, next.unwrap_or_default(), block);
                 continue;
@@ -345,7 +345,7 @@ impl<'a> Effects<'a> {
 
     /// Lengths mean something else now; an angle does only where the block names its axis.
     fn frame_moved(&mut self, block: &Block, line: usize) {
-        let named: Vec<String> = block.words().iter().map(|w| w.address.clone()).collect();
-        self.axes.lose(line, Why::Frame, |address| is_linear(address) || named.iter().any(|n| n == address));
+        let named = |address: &str| block.words().iter().any(|w| w.address == *address);
+        self.axes.lose(line, Why::Frame, |address| is_linear(address) || named(address));
     }
 }

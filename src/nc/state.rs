@@ -12,7 +12,6 @@ use super::modes::{Coordinate, Modes, MotionKind, Why};
 use super::motion::{Motion, Step};
 use super::token::Kind;
 use super::unfollowed::{Known, unknown_functions};
-use super::words::Word;
 use crate::error::Result;
 
 /// Modal state of a program, followed block by block.
@@ -62,16 +61,17 @@ impl State {
     /// [`NcFault::TwiceInBlock`] with line and column; the state then stands as before the block.
     pub fn apply(&mut self, block: &Block) -> Result<Step> {
         let words = self.axis_words(block);
-        let before = (self.modes.clone(), self.axes.coordinates().to_vec());
+        // Only a block that names an axis twice may have to be taken back.
+        let double = twice(&words).map(|double| (double, self.modes.clone(), self.axes.coordinates().to_vec()));
         let mut effects = Effects::new(self.dialect, &mut self.modes, &mut self.axes);
         effects.names(block);
-        effects.codes(block, words.iter().any(|w| !w.is_empty()));
+        effects.codes(block, words.iter().any(|named| named.first.is_some()));
         let mut reading = effects.finish();
         if reading.purpose == Purpose::Target
-            && let Some((axis, first, second)) = twice(&words)
+            && let Some(((axis, first, second), modes, coordinates)) = double
         {
-            self.modes = before.0;
-            self.axes.restore(before.1);
+            self.modes = modes;
+            self.axes.restore(coordinates);
             let (first, at) =
                 (block.column(block.words()[first].span.start), block.words()[second].span.start);
             let address = self.axes.addresses()[axis].clone();
@@ -107,26 +107,26 @@ impl State {
     }
 
     /// The words of the block that name axis after axis.
-    fn axis_words(&self, block: &Block) -> Vec<Vec<usize>> {
+    fn axis_words(&self, block: &Block) -> Vec<Named> {
         let of = |address: &String| {
-            let named = |(i, w): (usize, &Word)| (w.address == *address).then_some(i);
-            block.words().iter().enumerate().filter_map(named).collect()
+            let mut named = (0..block.words().len()).filter(|i| block.words()[*i].address == *address);
+            Named { first: named.next(), second: named.next() }
         };
         self.axes.addresses().iter().map(of).collect()
     }
 
     /// Moves, or gives the axis words their other meaning.
-    fn place(&mut self, block: &Block, words: &[Vec<usize>], reading: &mut Reading) {
+    fn place(&mut self, block: &Block, words: &[Named], reading: &mut Reading) {
         let line = block.line();
         if let Some(kind) = reading.kind {
             self.modes.motion = Some(kind);
         }
         let kind = self.modes.motion.unwrap_or(MotionKind::Unstated);
-        let named = |axis: usize| words[axis].first().copied();
+        let named = |axis: usize| words[axis].first;
         match reading.purpose {
             Purpose::Nothing => return,
             Purpose::Reference => {
-                let all = words.iter().all(|w| w.is_empty());
+                let all = words.iter().all(|named| named.first.is_none());
                 for axis in 0..words.len() {
                     if all || named(axis).is_some() {
                         self.axes.lose_one(axis, line, Why::Reference);
@@ -151,7 +151,7 @@ impl State {
             && direction.iter().any(|a| block.has_word(a) && !self.axes.addresses().iter().any(|o| o == a));
         let is_arc = matches!(kind, MotionKind::ArcCw | MotionKind::ArcCcw);
         let by_centre = is_arc && ["I", "J", "K", "R", "CR", "AR", "TURN"].iter().any(|a| block.has_word(a));
-        if !(words.iter().any(|w| !w.is_empty()) || by_polar || by_direction || by_centre) {
+        if !(words.iter().any(|named| named.first.is_some()) || by_polar || by_direction || by_centre) {
             return;
         }
         let start = self.target();
@@ -185,16 +185,20 @@ impl State {
             let normal = self.modes.normal();
             self.axes.lose(line, Why::Call, |a| a.starts_with(normal));
         }
-        let words = words.iter().map(|w| w.first().copied()).collect();
+        let words = words.iter().map(|named| named.first).collect();
         let machine_frame = reading.machine_frame;
         reading.step.motion = Some(Motion { line, kind, start, target, words, machine_frame });
     }
 }
 
+/// The words of a block that name one axis.
+#[derive(Clone, Copy)]
+struct Named {
+    first: Option<usize>,
+    second: Option<usize>,
+}
+
 /// The axis that two words name, and these words.
-fn twice(words: &[Vec<usize>]) -> Option<(usize, usize, usize)> {
-    words.iter().enumerate().find_map(|(axis, named)| match named[..] {
-        [first, second, ..] => Some((axis, first, second)),
-        _ => None,
-    })
+fn twice(words: &[Named]) -> Option<(usize, usize, usize)> {
+    words.iter().enumerate().find_map(|(axis, named)| Some((axis, named.first?, named.second?)))
 }

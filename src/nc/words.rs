@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
+use super::address::Address;
 use super::number::{MOST_DECIMALS, Number};
 
 /// An address and its value, as in `X1.5`, `C1=90`, `X=AC(10)`, `X[#1+2]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Word {
-    /// The address in upper case, with its index: `X`, `C1`, `_X_HOME`. Heidenhain's incremental `IX` is the address `X`.
-    pub address: String,
+    /// The address; Heidenhain's incremental `IX` is the address `X`.
+    pub address: Address,
     /// What the value means, where the word itself says it.
     pub how: How,
     /// The value.
