@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::chain::{Chain, Moved};
 use crate::check::random_command;
+use crate::few::Few;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use directions::{Direction, Equations, MOST, norm};
@@ -167,7 +168,7 @@ struct Look {
     /// The turn that is missing, as a rotation vector in `w`, rad.
     turn_w: Vec3<f64>,
     /// What each command does to the tip by its speed: the point of the tip, and the tool's turning, in `w`.
-    speeds: Vec<Twist<f64>>,
+    speeds: Few<Twist<f64>>,
 }
 
 /// One equation for each of `count`: what it makes of the speeds of the free commands.
@@ -275,13 +276,13 @@ impl<'a> Inverse<'a> {
 
     fn look(&self, chain: &Chain<f64>, goal: &Goal, q: &[f64]) -> Look {
         let (path, count) = (chain.path(), self.machine.commands().len());
-        let mut moved = vec![Moved::none(0.0); path.joint_count()];
+        let mut moved = Few::from_elem(Moved::none(0.0), path.joint_count());
         path.go_to(q, &mut moved);
         let still = Twist::zero(0.0);
-        let mut velocities = vec![still; path.joint_count()];
+        let mut velocities = Few::from_elem(still, path.joint_count());
         let tip = path.velocities(goal.t_from_tip.translation, &moved, &mut velocities);
         let tip = Pose { rotation: tip.rotation * goal.t_from_tip.rotation, ..tip };
-        let mut speeds = vec![still; count];
+        let mut speeds = Few::from_elem(still, count);
         path.by_command(&velocities, &mut speeds);
         let gap_w = goal.w_from_tip.translation - tip.translation;
         let turn_w = match self.mode {
@@ -352,8 +353,8 @@ impl<'a> Inverse<'a> {
     pub fn solve(&self, chain: &Chain<f64>, goal: &Goal, start: &[f64], free: &[bool]) -> Solution {
         let count = self.machine.commands().len();
         assert!(start.len() == count && free.len() == count, "one start and one flag per command");
-        let mut free = free.to_vec();
-        let mut from = start.to_vec();
+        let mut free = Few::from_slice(free);
+        let mut from = Few::from_slice(start);
         let mut worst: Option<(usize, f64)> = None;
         loop {
             let mut solution = self.newton(chain, goal, &from, start, &free);
@@ -395,7 +396,7 @@ impl<'a> Inverse<'a> {
         start: &[f64],
         free: &[bool],
     ) -> Solution {
-        let mut q = from.to_vec();
+        let mut q = Few::from_slice(from);
         let mut look = self.look(chain, goal, &q);
         let mut steps = 0;
         while steps < self.options.steps {
@@ -417,7 +418,7 @@ impl<'a> Inverse<'a> {
             };
             let mut shortened = 0;
             loop {
-                let next: Vec<f64> = q.iter().zip(&step).map(|(q, s)| q + part * s).collect();
+                let next: Few<f64> = q.iter().zip(&step).map(|(q, s)| q + part * s).collect();
                 let there = self.look(chain, goal, &next);
                 // Far from the goal a full step may overshoot; near it, and where a weak direction is drawn
                 // back, it counts.
@@ -432,7 +433,7 @@ impl<'a> Inverse<'a> {
         let (position_left_m, angle_left_rad) = self.left(&look);
         let reached = position_left_m <= self.options.position_m && angle_left_rad <= self.options.angle_rad;
         let outcome = if reached { Outcome::Reached } else { self.missed(&look, free) };
-        Solution { commands: q, outcome, position_left_m, angle_left_rad, steps }
+        Solution { commands: q.to_vec(), outcome, position_left_m, angle_left_rad, steps }
     }
 
     /// What is left of the mode's equations: m, rad.
@@ -442,12 +443,12 @@ impl<'a> Inverse<'a> {
     }
 
     /// (C2) to (C4).
-    fn step(&self, look: &Look, q: &[f64], start: &[f64], free: &[bool]) -> Vec<f64> {
-        let from_start: Vec<f64> = q.iter().zip(start).map(|(q, s)| q - s).collect();
+    fn step(&self, look: &Look, q: &[f64], start: &[f64], free: &[bool]) -> Few<f64> {
+        let from_start: Few<f64> = q.iter().zip(start).map(|(q, s)| q - s).collect();
         let weak = self.options.weak;
         let shifts = self.shift_rows(look, free);
         let turns = self.turn_rows(look, free);
-        let mut step = vec![0.0; q.len()];
+        let mut step = Few::from_elem(0.0, q.len());
         if self.mode == Mode::Pose && !self.by_slides {
             let (all, left) = (shifts.and(&turns), self.all_left(look));
             if !all.step_if_strong(&left, (0.05 * weak, 0.0), &mut step) {

@@ -22,6 +22,7 @@
 //! | room | noun |
 //! | --- | --- |
 //! | `wording` | how messages word what they count and quote |
+//! | `few` | short columns, a value for each joint or axis |
 //! | `scalar` | [`Scalar`]: what kinematics is generic over, `f64` and dual numbers |
 //! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians |
 //! | [`units`] | units at the borders, and what lengths and angles have one of each |
@@ -141,6 +142,7 @@ mod feature;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod feature;
+mod few;
 pub mod identify;
 #[cfg(feature = "import")]
 pub mod import;

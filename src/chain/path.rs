@@ -4,14 +4,12 @@
 //! of what is measured there. Both are walks along this way, from the tool inwards and from the workpiece outwards, with one vector or one
 //! wrench at hand instead of poses: `docs/model.md` (10), (14). What is constant between two turns is multiplied out before.
 
+use crate::few::Few;
 use crate::lie::{Mat3, Pose, Twist, Vec3, Wrench};
 use crate::machine::JointKind;
 use crate::scalar::Scalar;
 
 use super::Chain;
-
-/// Displacements of as many joints need no memory of their own.
-const FEW_JOINTS: usize = 16;
 
 /// What has to be known of a machine's constants to walk along it, many times.
 #[derive(Clone, Debug)]
@@ -186,17 +184,9 @@ impl Path {
 
     /// [`Path::w_from_t`] at the commands `q`, m or rad.
     pub fn pose_at(&self, q: &[f64]) -> Pose<f64> {
-        let none = Moved::none(0.0);
-        let (mut few, mut many) = ([none; FEW_JOINTS], Vec::new());
-        let moved = match few.get_mut(..self.joints.len()) {
-            Some(moved) => moved,
-            None => {
-                many.resize(self.joints.len(), none);
-                &mut many
-            }
-        };
-        self.go_to(q, moved);
-        self.w_from_t(moved, 0.0)
+        let mut moved = Few::from_elem(Moved::none(0.0), self.joints.len());
+        self.go_to(q, &mut moved);
+        self.w_from_t(&moved, 0.0)
     }
 
     /// Velocity of the point `p_t` of the tool and angular velocity of the tool, both seen from `w`, by the speed of each joint; joints in the

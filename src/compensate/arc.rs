@@ -3,13 +3,14 @@
 use std::f64::consts::TAU;
 
 use super::interpreter::Interpreter;
+use crate::few::Few;
 use crate::nc::{Block, Dialect, How, Motion, MotionKind, Plane, Value};
 
 /// An arc in program coordinates, m and rad.
 #[derive(Clone, Debug)]
 pub(super) struct Arc {
-    start: Vec<f64>,
-    end: Vec<f64>,
+    start: Few<f64>,
+    end: Few<f64>,
     /// The two axes of the plane, as indices of axes.
     plane: [usize; 2],
     centre: [f64; 2],
@@ -109,12 +110,12 @@ impl Arc {
             _ => number("TURN")?.unwrap_or(0.0),
         };
         let sweep = sign * (sweep + TAU * more.round());
-        Ok(Arc { start: start.to_vec(), end: end.to_vec(), plane, centre, radius: [r0, r1], from, sweep })
+        Ok(Arc { start: Few::from_slice(start), end: Few::from_slice(end), plane, centre, radius: [r0, r1], from, sweep })
     }
 
     /// Program coordinates at a part `s` of it; (C12).
-    pub fn at(&self, s: f64) -> Vec<f64> {
-        let mut p: Vec<f64> = self.start.iter().zip(&self.end).map(|(a, b)| a + (b - a) * s).collect();
+    pub fn at(&self, s: f64) -> Few<f64> {
+        let mut p: Few<f64> = self.start.iter().zip(&self.end).map(|(a, b)| a + (b - a) * s).collect();
         if s < 1.0 {
             let radius = self.radius[0] + (self.radius[1] - self.radius[0]) * s;
             let (sin, cos) = (self.from + self.sweep * s).sin_cos();

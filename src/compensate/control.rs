@@ -7,6 +7,7 @@ use super::axis::{self, Axis};
 use super::frame::{Change, Frame};
 use super::position::Position;
 use super::setup::{Setup, ToolAxis};
+use crate::few::Few;
 use crate::chain::Chain;
 use crate::inverse::{Goal, Inverse, InverseOptions, Mode};
 use crate::lie::{Mat3, Pose, Vec3};
@@ -25,7 +26,7 @@ pub(super) struct Control<'a> {
     tcp: bool,
     frame: Frame,
     /// Work offset less the machine's zero, by axis, m or rad.
-    offset: Vec<f64>,
+    offset: Few<f64>,
     /// Tool length that the control counts with, m.
     length: f64,
     /// Length of the tool that is in the spindle, m.
@@ -53,7 +54,7 @@ impl<'a> Control<'a> {
             units: Units::Millimetre,
             tcp: setup.tcp_at_start(),
             frame: Frame::new(count),
-            offset: vec![0.0; count],
+            offset: Few::from_elem(0.0, count),
             length: 0.0,
             tip_length: setup.reference_length(),
             normal: 2,
@@ -112,7 +113,7 @@ impl<'a> Control<'a> {
     }
 
     /// By axis: whether it is one of the two linear axes of the plane.
-    pub fn in_plane(&self) -> Vec<bool> {
+    pub fn in_plane(&self) -> Few<bool> {
         self.axes.iter().map(|a| a.tip().is_some_and(|k| k != self.normal)).collect()
     }
 
@@ -148,7 +149,7 @@ impl<'a> Control<'a> {
     }
 
     /// By how much written numbers are smaller than program coordinates, as [`Frame::slip`].
-    pub fn slip(&self) -> Vec<f64> {
+    pub fn slip(&self) -> Few<f64> {
         self.frame.slip(&self.axes)
     }
 
@@ -192,7 +193,7 @@ impl<'a> Control<'a> {
     /// where the offset puts the tip of a tool of no length; where the offset turns the table, its axes are
     /// those of `w` at joints zero.
     fn program_frame(&self) -> Pose<f64> {
-        let mut q = vec![0.0; self.machine.commands().len()];
+        let mut q = Few::from_elem(0.0, self.machine.commands().len());
         for (i, axis) in self.axes.iter().enumerate() {
             if let Some((c, sign)) = axis.command() {
                 let on_table = self.machine.joints().any(|(j, joint)| {
@@ -203,7 +204,7 @@ impl<'a> Control<'a> {
                 }
             }
         }
-        let (there, home) = (self.nominal.sweep(&q), self.nominal.sweep(&vec![0.0; q.len()]));
+        let (there, home) = (self.nominal.sweep(&q), self.nominal.sweep(&Few::from_elem(0.0, q.len())));
         let tip = (there.w_from_t() * self.t_from_tip(0.0)).translation;
         let rotation = there.b_from_w().rotation.transpose() * home.b_from_w().rotation;
         Pose { rotation, translation: tip }
@@ -252,10 +253,10 @@ impl<'a> Control<'a> {
     ///
     /// `program`: one per axis, m or rad. `near`: commands of joints without address, and a start for the
     /// rest.
-    pub fn joints(&self, program: &[f64], near: &[f64]) -> Option<Vec<f64>> {
+    pub fn joints(&self, program: &[f64], near: &[f64]) -> Option<Few<f64>> {
         let p = self.frame.pose().transform(self.triple(program));
-        let mut q = near.to_vec();
-        let mut free = vec![false; q.len()];
+        let mut q = Few::from_slice(near);
+        let mut free = Few::from_elem(false, q.len());
         for (i, axis) in self.axes.iter().enumerate() {
             let Some((c, sign)) = axis.command() else { continue };
             match axis.tip() {
@@ -273,11 +274,11 @@ impl<'a> Control<'a> {
         let t_from_tip = self.t_from_tip(self.length);
         let w_from_tip = Pose::translation(self.w_from_program.transform(p));
         let solution = self.inverse.solve(&self.nominal, &Goal { t_from_tip, w_from_tip }, &q, &free);
-        (solution.position_left_m < 1e-9).then_some(solution.commands)
+        (solution.position_left_m < 1e-9).then(|| solution.commands.into())
     }
 
     /// Program coordinates of joint commands, one per axis; `other`: of addresses without joint.
-    pub fn program(&self, q: &[f64], other: &[f64]) -> Vec<f64> {
+    pub fn program(&self, q: &[f64], other: &[f64]) -> Few<f64> {
         let mut p = [0.0; 3];
         let back = self.frame.pose().inverse();
         if self.tcp {
@@ -306,9 +307,9 @@ impl<'a> Control<'a> {
     }
 
     /// The joints at a part `s` of a straight move, as the control moves them.
-    pub fn between(&self, a: &Position, b: &Position, s: f64) -> Option<Vec<f64>> {
+    pub fn between(&self, a: &Position, b: &Position, s: f64) -> Option<Few<f64>> {
         let mix =
-            |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + (b - a) * s).collect() };
+            |a: &[f64], b: &[f64]| -> Few<f64> { a.iter().zip(b).map(|(a, b)| a + (b - a) * s).collect() };
         let q = mix(a.q(), b.q());
         if !self.tcp {
             return Some(q);

@@ -9,6 +9,7 @@ use super::model::Model;
 use super::position::Position;
 use super::style::{Style, plain};
 use super::tip_error::TipError;
+use crate::few::Few;
 use crate::calibration::LeftOut;
 use crate::chain::Chain;
 use crate::inverse::{Goal, Inverse, Mode, Solution};
@@ -78,8 +79,8 @@ impl Correction {
 
 /// A position corrected, before rounding.
 struct Corrected {
-    meant: Vec<f64>,
-    sent: Vec<f64>,
+    meant: Few<f64>,
+    sent: Few<f64>,
     /// The piece that it belongs to.
     piece: usize,
 }
@@ -166,8 +167,8 @@ impl<'a> Corrector<'a> {
     }
 
     /// The joint commands that bring tip and axis of the actual machine where `meant` has them.
-    pub fn sent(&self, program: &Interpreter, meant: &[f64]) -> Vec<f64> {
-        self.settle(&program.control().goal(meant), meant, &program.free()).1.commands
+    pub fn sent(&self, program: &Interpreter, meant: &[f64]) -> Few<f64> {
+        self.settle(&program.control().goal(meant), meant, &program.free()).1.commands.into()
     }
 
     /// The joint commands that bring tip and axis of a machine with this chain where `meant` has them, with these commands free.
@@ -195,9 +196,9 @@ impl<'a> Corrector<'a> {
         let free = program.free();
         let goal = control.goal(q);
         let (chain, solution) = self.settle(&goal, q, &free);
-        let mut exact = solution.commands.clone();
+        let mut exact: Few<f64> = Few::from_slice(&solution.commands);
         let (slip, mut numbers) = (control.slip(), Vec::new());
-        let mut coordinates = program.written().program().to_vec();
+        let mut coordinates = Few::from_slice(program.written().program());
         let word = |i: usize| block.zip(words.get(i).copied().flatten()).map(|(b, w)| &b.words()[w]);
         let rotary = |i: usize| control.axes()[i].is_rotary();
         // Angles first; lengths then make up for what rounding does to them.
@@ -211,9 +212,9 @@ impl<'a> Corrector<'a> {
                 rounded[i] = coordinates[i];
             }
             if let Some(there) = control.joints(&rounded, &exact) {
-                let slides: Vec<bool> = (0..free.len()).map(|c| free[c] && self.is_prismatic(c)).collect();
+                let slides: Few<bool> = (0..free.len()).map(|c| free[c] && self.is_prismatic(c)).collect();
                 if slides.iter().filter(|s| **s).count() == 3 {
-                    exact = self.slides.solve(&chain, &goal, &there, &slides).commands;
+                    exact = self.slides.solve(&chain, &goal, &there, &slides).commands.into();
                 } else {
                     exact = there;
                 }
@@ -224,8 +225,8 @@ impl<'a> Corrector<'a> {
             coordinates[i] = number((program, style), (i, slip[i]), moved[i], word(i), &mut numbers);
         }
         drop(chain);
-        let (meant, sent, piece) = (q.to_vec(), solution.commands.clone(), self.model.piece());
-        self.last = Some(Corrected { meant, sent, piece });
+        let (meant, sent) = (Few::from_slice(q), Few::from_slice(&solution.commands));
+        self.last = Some(Corrected { meant, sent, piece: self.model.piece() });
         let q = control.joints(&coordinates, &exact).unwrap_or(exact);
         Correction { goal, numbers, written: Position::new(q, coordinates), solution }
     }

@@ -11,6 +11,7 @@ use super::pass::Pass;
 use super::position::Position;
 use super::refusal::refuse;
 use super::tip_error::TipError;
+use crate::few::Few;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Motion};
 
@@ -24,7 +25,7 @@ pub(super) fn write(
     pass: &mut Pass,
     block: &mut Block,
     motion: &Motion,
-    target: Vec<f64>,
+    target: Few<f64>,
     out: &mut dyn Write,
 ) -> Result<()> {
     let line = block.line();
@@ -100,14 +101,14 @@ fn bends(pass: &Pass, block: &Block, arc: &Arc, count: usize) -> Result<f64> {
     let (mut from, mut worst) = (program.written().clone(), 0.0f64);
     let mut piece = model.piece();
     for k in 1..=count {
-        let at = |s: f64| -> Result<(Vec<f64>, Vec<f64>)> {
+        let at = |s: f64| -> Result<(Few<f64>, Few<f64>)> {
             let coordinates = arc.at(s / count as f64);
             Ok((program.joints(block, &coordinates)?, coordinates))
         };
         let (q, coordinates) = at(k as f64)?;
         model.advance(&q, &ways);
         let sent = pass.corrector().solve_with(&model.chain_at(&q), program, &q, &free).commands;
-        let to = Position::new(sent.clone(), control.program(&sent, &coordinates));
+        let to = Position::new(Few::from_slice(&sent), control.program(&sent, &coordinates));
         // Across a reversal the correction steps, and no line is short enough.
         let steps = std::mem::replace(&mut piece, model.piece()) != model.piece();
         if let Some(sent) = control.between(&from, &to, 0.5).filter(|_| !steps) {

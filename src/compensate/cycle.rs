@@ -7,6 +7,7 @@ use super::output::put;
 use super::pass::Pass;
 use super::position::Position;
 use super::refusal::{line_text, refuse};
+use crate::few::Few;
 use crate::error::Result;
 use crate::nc::{Block, Distance, Motion};
 
@@ -15,7 +16,7 @@ pub(super) fn write(
     pass: &mut Pass,
     block: &mut Block,
     motion: &Motion,
-    mut target: Vec<f64>,
+    mut target: Few<f64>,
     out: &mut dyn Write,
 ) -> Result<()> {
     let line = block.line();
@@ -34,7 +35,7 @@ pub(super) fn write(
     pass.need_places(block, motion, &q, &|i| in_plane[i])?;
     let mut correction = pass.correct(block, &q, Some(&motion.words))?;
     correction.keep(&in_plane);
-    let mut coordinates = correction.written().program().to_vec();
+    let mut coordinates = Few::from_slice(correction.written().program());
     for i in &beside {
         coordinates[*i] = pass.program().written().program()[*i];
     }

@@ -1,5 +1,6 @@
 //! What a block makes happen, in the order in which it does.
 
+use crate::few::Few;
 use crate::nc::{Motion, MotionKind};
 
 /// One thing that a block makes happen.
@@ -10,9 +11,9 @@ pub(super) enum Event {
     /// The machine goes to a place of its own, a reference point or one in its own frame.
     Sent {
         /// Joint commands there, m or rad.
-        q: Vec<f64>,
+        q: Few<f64>,
         /// By command: whether its way there is known.
-        ways: Vec<bool>,
+        ways: Few<bool>,
         /// The motion that the block puts into force, if it does.
         kind: Option<MotionKind>,
     },
@@ -22,7 +23,7 @@ pub(super) enum Event {
     Move {
         motion: Motion,
         /// Where it ends, by axis, m or rad.
-        target: Vec<f64>,
+        target: Few<f64>,
         /// Whether a cycle runs there.
         drills: bool,
     },

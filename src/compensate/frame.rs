@@ -2,6 +2,7 @@
 
 use super::axis::Axis;
 use super::code::has_g;
+use crate::few::Few;
 use crate::lie::{Pose, Vec3};
 use crate::nc::{Block, Dialect, Kind, Plane, Token, Units, Value};
 
@@ -11,12 +12,12 @@ pub(super) struct Frame {
     /// Of X, Y, Z, m.
     pose: Pose<f64>,
     /// Of the other axes, m or rad, added.
-    shift: Vec<f64>,
+    shift: Few<f64>,
     /// The part of `pose` and `shift` that `G52` gave, and the part of `G92`, by axis.
-    local: Vec<f64>,
-    preset: Vec<f64>,
+    local: Few<f64>,
+    preset: Few<f64>,
     /// By how much coordinates as written are smaller than those that are meant, by axis: what rounding left of the numbers of `G92`.
-    slip: Vec<f64>,
+    slip: Few<f64>,
     /// `G68`: inside the shifts.
     turn: Option<Pose<f64>>,
 }
@@ -35,16 +36,16 @@ impl Frame {
     pub fn new(axes: usize) -> Self {
         Frame {
             pose: Pose::identity(0.0),
-            shift: vec![0.0; axes],
-            local: vec![0.0; axes],
-            preset: vec![0.0; axes],
-            slip: vec![0.0; axes],
+            shift: Few::from_elem(0.0, axes),
+            local: Few::from_elem(0.0, axes),
+            preset: Few::from_elem(0.0, axes),
+            slip: Few::from_elem(0.0, axes),
             turn: None,
         }
     }
 
     /// By how much the numbers of a program that is written are smaller than its coordinates, by axis, m or rad.
-    pub fn slip(&self, axes: &[Axis]) -> Vec<f64> {
+    pub fn slip(&self, axes: &[Axis]) -> Few<f64> {
         let mut outside = [0.0; 3];
         for (axis, slip) in axes.iter().zip(&self.slip) {
             if let Some(k) = axis.tip() {
@@ -128,7 +129,7 @@ impl Frame {
         let inner = match name.as_str() {
             "TRANS" | "ATRANS" => {
                 let mut p = [0.0; 3];
-                let mut shift = vec![0.0; count];
+                let mut shift = Few::from_elem(0.0, count);
                 for (i, axis) in axes.iter().enumerate() {
                     let by = number(block, axis.address()).map_or(0.0, |v| axis.si(v, units));
                     match axis.tip() {
@@ -170,7 +171,7 @@ impl Frame {
         } else {
             // Every absolute one takes the place of all before it.
             if matches!(name.as_str(), "ROT" | "SCALE" | "MIRROR") {
-                self.shift = vec![0.0; count];
+                self.shift = Few::from_elem(0.0, count);
             }
             self.pose = inner;
         }
@@ -219,8 +220,8 @@ impl Frame {
             if self.turn.is_some() {
                 return Change::Unknown(text);
             }
-            self.preset = vec![0.0; count];
-            self.slip = vec![0.0; count];
+            self.preset = Few::from_elem(0.0, count);
+            self.slip = Few::from_elem(0.0, count);
         } else if has_g(block, 68.0) {
             let (normal, first, second) = match plane {
                 None | Some(Plane::Xy) => (2, "X", "Y"),

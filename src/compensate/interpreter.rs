@@ -16,6 +16,7 @@ use super::setup::Setup;
 use super::target;
 use super::tool::Tool;
 use super::ways::Ways;
+use crate::few::Few;
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::nc::{Block, Dialect, How, Kind, Modes, Motion, MotionKind, State, Step};
@@ -52,7 +53,7 @@ impl<'a> Interpreter<'a> {
         let control = Control::new(machine, setup);
         let state = State::new(dialect, control.axes().iter().map(|a| a.address()));
         let (axes, commands) = (control.axes().len(), machine.commands().len());
-        let start = Position::new(vec![0.0; commands], vec![0.0; axes]);
+        let start = Position::new(Few::from_elem(0.0, commands), Few::from_elem(0.0, axes));
         let mut interpreter = Interpreter {
             control,
             state,
@@ -82,7 +83,7 @@ impl<'a> Interpreter<'a> {
         // Where axes stand is said joint by joint.
         let tcp = self.control.tcp();
         self.control.set_tcp(false);
-        let mut program = vec![0.0; self.places.len()];
+        let mut program = Few::from_elem(0.0, self.places.len());
         for (i, axis) in self.control.axes().iter().enumerate() {
             if let Some(value) = setup.start(axis.address(), axis.is_rotary()) {
                 program[i] = value;
@@ -383,7 +384,7 @@ impl<'a> Interpreter<'a> {
     }
 
     fn sent(&mut self, kind: Option<MotionKind>) -> Event {
-        Event::Sent { q: self.meant.q().to_vec(), ways: self.take_way(), kind }
+        Event::Sent { q: Few::from_slice(self.meant.q()), ways: self.take_way(), kind }
     }
 
     /// A move under program coordinates.
@@ -419,7 +420,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// Joint commands of program coordinates; a place that the linear axes cannot bring about is refused.
-    pub fn joints(&self, block: &Block, program: &[f64]) -> Result<Vec<f64>> {
+    pub fn joints(&self, block: &Block, program: &[f64]) -> Result<Few<f64>> {
         match self.control.joints(program, self.meant.q()) {
             Some(q) => Ok(q),
             None => refuse(block, 0, CompensateFault::NoTcp),
@@ -428,8 +429,8 @@ impl<'a> Interpreter<'a> {
 
     /// Commands that may be written: their axis has a place in the program. Where the tip is programmed the
     /// three linear ones go together.
-    pub fn free(&self) -> Vec<bool> {
-        let mut free = vec![false; self.control.machine().commands().len()];
+    pub fn free(&self) -> Few<bool> {
+        let mut free = Few::from_elem(false, self.control.machine().commands().len());
         for (i, axis) in self.control.axes().iter().enumerate() {
             if let Some((c, _)) = axis.command() {
                 free[c] = self.places.is_placed(i) || (self.control.tcp() && axis.tip().is_some());
@@ -439,12 +440,12 @@ impl<'a> Interpreter<'a> {
     }
 
     /// By command: whether the way from the position last told to the one in force is known.
-    pub fn open_ways(&self) -> Vec<bool> {
+    pub fn open_ways(&self) -> Few<bool> {
         self.ways.open(&self.control, &self.places)
     }
 
     /// Goes to a position in force; by command whether its way there is known.
-    pub fn take_way(&mut self) -> Vec<bool> {
+    pub fn take_way(&mut self) -> Few<bool> {
         self.ways.take(&self.control, &self.places)
     }
 

@@ -13,6 +13,7 @@ use super::position::Position;
 use super::refusal::refuse;
 use super::style::{model_of, plain};
 use super::words;
+use crate::few::Few;
 use crate::chain::Chain;
 use crate::error::Result;
 use crate::nc::{Block, Feed, Motion, MotionKind, Number, Word};
@@ -85,7 +86,7 @@ pub(super) fn write(
     pass: &mut Pass,
     (block, motion): (&mut Block, &Motion),
     count: usize,
-    at: &dyn Fn(f64) -> Vec<f64>,
+    at: &dyn Fn(f64) -> Few<f64>,
     arc: Option<&Arc>,
     out: &mut dyn Write,
 ) -> Result<()> {

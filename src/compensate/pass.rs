@@ -21,6 +21,7 @@ use super::style::{Style, plain};
 use super::tip_error::TipError;
 use super::unseen::UnseenSums;
 use super::words;
+use crate::few::Few;
 use crate::chain::Chain;
 use crate::error::Result;
 use crate::inverse::{Outcome, Solution};
@@ -96,7 +97,7 @@ impl<'a> Pass<'a> {
         &mut self,
         block: &mut Block,
         out: &mut dyn Write,
-    ) -> Result<Option<(Motion, Vec<f64>, bool)>> {
+    ) -> Result<Option<(Motion, Few<f64>, bool)>> {
         for event in self.program.block(block)? {
             match event {
                 Event::Units => self.style.forget_lengths(),

@@ -1,15 +1,17 @@
 //! A position of a machine: its joints, and what a program calls it.
 
+use crate::few::Few;
+
 /// A position, as joints and as program coordinates in the frame in force; m or rad.
 #[derive(Clone, Debug)]
 pub(super) struct Position {
-    q: Vec<f64>,
-    program: Vec<f64>,
+    q: Few<f64>,
+    program: Few<f64>,
 }
 
 impl Position {
     /// `q`: by command; `program`: by axis.
-    pub fn new(q: Vec<f64>, program: Vec<f64>) -> Self {
+    pub fn new(q: Few<f64>, program: Few<f64>) -> Self {
         Position { q, program }
     }
 
@@ -29,7 +31,7 @@ impl Position {
     }
 
     /// The same place under other coordinates.
-    pub fn rename(&mut self, program: Vec<f64>) {
+    pub fn rename(&mut self, program: Few<f64>) {
         self.program = program;
     }
 }

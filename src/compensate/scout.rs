@@ -8,6 +8,7 @@ use super::interpreter::Interpreter;
 use super::model::Model;
 use super::position::Position;
 use super::subprograms::Follow;
+use crate::few::Few;
 use crate::error::Result;
 use crate::nc::{Block, Motion, MotionKind};
 
@@ -56,7 +57,7 @@ impl<'a> Scout<'a> {
         self.tell(q, &ways);
     }
 
-    fn go(&mut self, block: &Block, motion: &Motion, mut target: Vec<f64>, drills: bool) -> Result<()> {
+    fn go(&mut self, block: &Block, motion: &Motion, mut target: Few<f64>, drills: bool) -> Result<()> {
         if drills {
             let in_plane = self.program.control().in_plane();
             for i in (0..target.len()).filter(|i| !in_plane[*i]) {

@@ -11,6 +11,7 @@ use super::pass::Pass;
 use super::position::Position;
 use super::refusal::refuse;
 use super::turned;
+use crate::few::Few;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Motion, MotionKind};
 
@@ -24,7 +25,7 @@ pub(super) fn write(
     pass: &mut Pass,
     block: &mut Block,
     motion: &Motion,
-    target: Vec<f64>,
+    target: Few<f64>,
     out: &mut dyn Write,
 ) -> Result<()> {
     let line = block.line();
@@ -40,7 +41,7 @@ pub(super) fn write(
         && known
         && pass.program().dialect() != Dialect::Heidenhain
     {
-        let at = |s: f64| -> Vec<f64> {
+        let at = |s: f64| -> Few<f64> {
             meant.program().iter().zip(end.program()).map(|(a, b)| a + (b - a) * s).collect()
         };
         // What leads out of travel is refused before it is subdivided.
@@ -94,7 +95,7 @@ pub(super) fn write(
 }
 
 /// Largest error of the tip, m, that a straight move leaves in `count` equal parts, rounding aside.
-fn unsplit(pass: &Pass, at: &dyn Fn(f64) -> Vec<f64>, count: usize) -> f64 {
+fn unsplit(pass: &Pass, at: &dyn Fn(f64) -> Few<f64>, count: usize) -> f64 {
     let (program, corrector) = (pass.program(), pass.corrector());
     let control = program.control();
     let corrected = |s: f64| -> Option<(Position, Position)> {

@@ -6,6 +6,7 @@ use super::control::Control;
 use super::fault::CompensateFault;
 use super::places::Places;
 use super::refusal::refuse;
+use crate::few::Few;
 use crate::error::Result;
 use crate::nc::{Block, Dialect, Distance, How, Modes, Motion, MotionKind, Value};
 
@@ -53,8 +54,8 @@ pub(super) fn of(
     modes: &Modes,
     places: &Places,
     from: &[f64],
-) -> Result<Vec<f64>> {
-    let mut target = from.to_vec();
+) -> Result<Few<f64>> {
+    let mut target = Few::from_slice(from);
     for (i, index) in motion.words.iter().enumerate() {
         let Some(index) = *index else { continue };
         let word = &block.words()[index];

@@ -9,6 +9,7 @@ use super::interpreter::Interpreter;
 use super::position::Position;
 use super::refusal::refuse;
 use super::subprograms::Follow;
+use crate::few::Few;
 use crate::error::Result;
 use crate::lie::Pose;
 use crate::nc::{Block, Motion, MotionKind};
@@ -71,7 +72,7 @@ impl<'a, M: Machine> Trace<'a, M> {
         self.legs.drain(..)
     }
 
-    fn go(&mut self, block: &Block, motion: &Motion, mut target: Vec<f64>, drills: bool) -> Result<()> {
+    fn go(&mut self, block: &Block, motion: &Motion, mut target: Few<f64>, drills: bool) -> Result<()> {
         let control = self.program.control();
         if drills {
             let in_plane = control.in_plane();

@@ -10,6 +10,7 @@ use super::pass::Pass;
 use super::position::Position;
 use super::style::{model_of, plain};
 use super::words;
+use crate::few::Few;
 use crate::error::Result;
 use crate::nc::{Block, Distance, Feed, Motion, Value};
 
@@ -28,8 +29,8 @@ pub(super) fn write(
     written: (&Position, &Position),
     out: &mut dyn Write,
 ) -> Result<()> {
-    let rotary: Vec<bool> = pass.program().control().axes().iter().map(|axis| axis.is_rotary()).collect();
-    let linear: Vec<bool> = rotary.iter().map(|rotary| !rotary).collect();
+    let rotary: Few<bool> = pass.program().control().axes().iter().map(|axis| axis.is_rotary()).collect();
+    let linear: Few<bool> = rotary.iter().map(|rotary| !rotary).collect();
     let by = |i: usize| written.1.program()[i] - written.0.program()[i];
     let apart = (0..linear.len()).filter(|i| linear[*i]).map(|i| by(i).powi(2)).sum::<f64>().sqrt();
     let count = ((apart / APART).ceil() as usize).clamp(1, MOST);
@@ -45,7 +46,7 @@ pub(super) fn write(
     }
     for k in 1..=count {
         let s = k as f64 / count as f64;
-        let at: Vec<f64> =
+        let at: Few<f64> =
             meant.0.program().iter().zip(meant.1.program()).map(|(a, b)| a + (b - a) * s).collect();
         let point = match k == count {
             true => meant.1.clone(),
@@ -116,7 +117,7 @@ fn stay(pass: &Pass, block: &mut Block, motion: &Motion, linear: &[bool]) -> Res
 fn note(pass: &mut Pass, block: &Block, point: &Position, correction: &Correction, rotary: &[bool]) {
     let (program, control) = (pass.program(), pass.program().control());
     let choose = |i: usize| if rotary[i] { correction.written() } else { program.written() }.program()[i];
-    let turned: Vec<f64> = (0..rotary.len()).map(choose).collect();
+    let turned: Few<f64> = (0..rotary.len()).map(choose).collect();
     if let Some(q) = control.joints(&turned, correction.written().q()) {
         let left = pass.corrector().error(control, &q, point.q()).m();
         pass.report().largest_mid_line_m.take(left, block.line());

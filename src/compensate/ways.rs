@@ -1,5 +1,7 @@
 //! From where each axis comes: only a way between two known places gives a direction of travel.
 
+use crate::few::Few;
+
 use super::control::Control;
 use super::places::Places;
 
@@ -7,19 +9,19 @@ use super::places::Places;
 #[derive(Clone, Debug)]
 pub(super) struct Ways {
     /// By axis: whether it was known where it stood.
-    sure: Vec<bool>,
+    sure: Few<bool>,
     /// By command: whether its position was known.
-    known: Vec<bool>,
+    known: Few<bool>,
 }
 
 impl Ways {
     /// Nothing has been told.
     pub fn new(axes: usize, commands: usize) -> Self {
-        Ways { sure: vec![false; axes], known: vec![false; commands] }
+        Ways { sure: Few::from_elem(false, axes), known: Few::from_elem(false, commands) }
     }
 
     /// By command: whether its position is known, and whether its way there from the position last told is.
-    fn judge(&self, control: &Control, places: &Places) -> (Vec<bool>, Vec<bool>) {
+    fn judge(&self, control: &Control, places: &Places) -> (Few<bool>, Few<bool>) {
         let axes = || control.axes().iter().enumerate();
         // Where the tip is programmed, the places of the linear joints follow from all of its words. A rotary axis that the
         // program has not named is taken as standing at zero until it does.
@@ -29,7 +31,7 @@ impl Ways {
             (None, false) => true,
         });
         let turned = axes().any(|(i, axis)| axis.is_rotary() && places.is_sure(i) && !self.sure[i]);
-        let mut known = vec![false; self.known.len()];
+        let mut known = Few::from_elem(false, self.known.len());
         let mut ways = known.clone();
         for (i, axis) in axes() {
             let Some((c, _)) = axis.command() else { continue };
@@ -41,12 +43,12 @@ impl Ways {
     }
 
     /// By command: whether the way from the position last told to the one in force is known.
-    pub fn open(&self, control: &Control, places: &Places) -> Vec<bool> {
+    pub fn open(&self, control: &Control, places: &Places) -> Few<bool> {
         self.judge(control, places).1
     }
 
     /// Takes the way to the one in force; by command whether it is known.
-    pub fn take(&mut self, control: &Control, places: &Places) -> Vec<bool> {
+    pub fn take(&mut self, control: &Control, places: &Places) -> Few<bool> {
         let (known, ways) = self.judge(control, places);
         self.known = known;
         self.sure.copy_from_slice(places.sure());

@@ -1,5 +1,7 @@
 //! Equations over the commands, and the directions in which these move them, `docs/compensate.md` (C2).
 
+use smallvec::SmallVec;
+
 /// Most equations of a task: those of a pose.
 pub(super) const MOST: usize = 6;
 
@@ -15,12 +17,12 @@ const NOTHING: f64 = 1e-14;
 pub(super) struct Equations {
     count: usize,
     columns: usize,
-    values: Vec<f64>,
+    values: SmallVec<[f64; 64]>,
 }
 
 impl Equations {
     pub fn new(count: usize, columns: usize) -> Self {
-        Equations { count, columns, values: vec![0.0; count * columns] }
+        Equations { count, columns, values: SmallVec::from_elem(0.0, count * columns) }
     }
 
     /// How many there are.

@@ -146,13 +146,14 @@ impl Cutter<'_> {
         if self.line.assigns(equals) {
             return self.assigned(digits, equals);
         }
-        let value = self.line.blanks(start + 1);
-        let end = self.line.value_end(value);
-        if end == value {
+        let from = self.line.blanks(start + 1);
+        let (end, number) = self.line.value(from);
+        if end == from {
             return self.push(Kind::Name, start + 1);
         }
         let address = Address::new(&self.line.bytes()[start..=start]);
-        self.word(address, How::Modal, value..end, end);
+        let value = number.map_or(Value::Expression, Value::Number);
+        self.word_of(address, How::Modal, value, from..end, end);
     }
 
     /// Letters up to `letters`, two or more, or with digits and `_`.
@@ -279,10 +280,15 @@ impl Cutter<'_> {
         self.push(Kind::Other, end);
     }
 
-    /// A word from here to `end`.
+    /// A word from here to `end`, its value a number if it is one.
     fn word(&mut self, address: Address, how: How, value_span: Range<usize>, end: usize) {
         let value = Number::parse(&self.line.bytes()[value_span.clone()], self.line.dialect())
             .map_or(Value::Expression, Value::Number);
+        self.word_of(address, how, value, value_span, end);
+    }
+
+    /// A word from here to `end`.
+    fn word_of(&mut self, address: Address, how: How, value: Value, value_span: Range<usize>, end: usize) {
         let span = self.at..end;
         self.words.push(Word { address, how, value, span, value_span });
         self.push(Kind::Word(self.words.len() - 1), end);

@@ -47,6 +47,18 @@ impl<'a> Line<'a> {
 
     /// The end of a value without `=` that starts at `at`; `at` where there is none.
     pub fn value_end(&self, at: usize) -> usize {
+        self.value(at).0
+    }
+
+    /// As [`Line::value_end`], with the value where that is a plain number.
+    pub fn value(&self, at: usize) -> (usize, Option<Number>) {
+        let number = Number::at_start(&self.bytes[at..], self.dialect);
+        let end = self.end_of_value(at, number.map(|(_, length)| length));
+        (end, number.filter(|(_, length)| at + length == end).map(|(number, _)| number))
+    }
+
+    /// `number`: length of the plain number there.
+    fn end_of_value(&self, at: usize, number: Option<usize>) -> usize {
         let sign = at + usize::from(matches!(self.byte(at), Some(b'+' | b'-')));
         let heidenhain = self.dialect == Dialect::Heidenhain;
         let end = match self.byte(sign) {
@@ -58,8 +70,8 @@ impl<'a> Line<'a> {
                 return sign + 1 + kind + self.digits(sign + 1 + kind);
             }
             Some(b'"') => return self.string(sign),
-            _ => match Number::at_start(&self.bytes[at..], self.dialect) {
-                Some((_, length)) => at + length,
+            _ => match number {
+                Some(length) => at + length,
                 // A number too large for any control.
                 None if self.digits(sign) > 0 => sign + self.digits(sign),
                 None => return at,
