@@ -57,6 +57,11 @@ impl Chain<f64> {
         self.path().pose_at(q)
     }
 
+    /// Where a point of frame `t` is in frame `w`, m, for a chain that is asked many times.
+    pub(crate) fn tool_point(&self, q: &[f64], p_t: Vec3<f64>) -> Vec3<f64> {
+        self.path().point_at(q, p_t)
+    }
+
     /// The way from the workpiece to the tool, laid out once.
     pub(crate) fn path(&self) -> &Path {
         self.path.get_or_init(|| Path::new(self))

@@ -189,6 +189,13 @@ impl Path {
         self.w_from_t(&moved, 0.0)
     }
 
+    /// [`Path::point_w`] at the commands `q`, m or rad.
+    pub fn point_at(&self, q: &[f64], p_t: Vec3<f64>) -> Vec3<f64> {
+        let mut moved = Few::from_elem(Moved::none(0.0), self.joints.len());
+        self.go_to(q, &mut moved);
+        self.point_w(p_t, &moved)
+    }
+
     /// Velocity of the point `p_t` of the tool and angular velocity of the tool, both seen from `w`, by the speed of each joint; joints in the
     /// order of the way, `docs/model.md` (13). Returns the pose in `w` of frame `t` shifted to that point.
     #[inline(always)]

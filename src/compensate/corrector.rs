@@ -140,13 +140,15 @@ impl<'a> Corrector<'a> {
         Some(TipError::between(control.tip_pose(&last.sent), control.tip_pose(&again.commands)))
     }
 
-    /// What the model says is wrong where the program means `meant` and the joints are sent to `sent`.
-    pub fn error(&self, control: &Control, sent: &[f64], meant: &[f64]) -> TipError {
-        self.error_from(&control.goal(meant), sent)
+    /// How far the tip is off by the model, m, where the program means `meant` and the joints are sent to `sent`.
+    pub fn distance(&self, control: &Control, sent: &[f64], meant: &[f64]) -> f64 {
+        let tip_t = control.tip().translation;
+        let there = self.model.chain_at(sent).tool_point(sent, tip_t);
+        (there - control.nominal().tool_point(meant, tip_t)).norm()
     }
 
     /// What the model says is wrong where the joints are sent to `sent`.
-    pub fn error_from(&self, goal: &Goal, sent: &[f64]) -> TipError {
+    pub fn error(&self, goal: &Goal, sent: &[f64]) -> TipError {
         TipError::between(self.model.chain_at(sent).tool_pose(sent) * goal.t_from_tip, goal.w_from_tip)
     }
 

@@ -41,8 +41,8 @@ pub(super) fn write(
     }
     let written = Position::new(pass.program().joints(block, &coordinates)?, coordinates);
     pass.put_words(block, motion, &correction)?;
-    let left = pass.corrector().error(pass.program().control(), written.q(), &q);
-    pass.report().largest_cycle_m.take(left.m(), line);
+    let left = pass.corrector().distance(pass.program().control(), written.q(), &q);
+    pass.report().largest_cycle_m.take(left, line);
     pass.report().cycles += 1;
     pass.put_in_force(motion.kind);
     pass.arrive_behind_cycle(Position::new(q, target), written);

@@ -105,7 +105,7 @@ pub(super) fn write(
         let correction = pass.correct(block, point.q(), (k == own).then_some(&motion.words[..]))?;
         if let (Some(_), Some(tolerance)) = (arc, pass.options().arcs) {
             let left =
-                pass.corrector().error(pass.program().control(), correction.written().q(), point.q()).m();
+                pass.corrector().distance(pass.program().control(), correction.written().q(), point.q());
             if left > tolerance {
                 return not_held(pass, block, pass.corrector().model().chain(), point.q(), (left, tolerance));
             }
@@ -148,7 +148,7 @@ fn look_between(
     let (program, control) = (pass.program(), pass.program().control());
     if let Some(sent) = control.between(program.written(), correction.written(), 0.5) {
         let wanted = program.joints(block, middle)?;
-        let left = pass.corrector().error(control, &sent, &wanted).m();
+        let left = pass.corrector().distance(control, &sent, &wanted);
         let report = pass.report();
         let worst = if is_arc { &mut report.largest_arc_m } else { &mut report.largest_mid_line_m };
         worst.take(left, block.line());

@@ -329,7 +329,7 @@ impl<'a> Pass<'a> {
         let (goal, written) = (*correction.goal(), correction.into_written());
         // Where an axis stands at a place of the machine, the tip is nowhere that matters.
         if !self.program.places().any_parked() {
-            let left = self.corrector.error_from(&goal, written.q());
+            let left = self.corrector.error(&goal, written.q());
             self.report.largest_left_m.take(left.m(), line);
             self.report.largest_left_rad.take(left.rad(), line);
         }

@@ -120,7 +120,7 @@ fn mid_line(pass: &Pass, meant: (&Position, &Position), written: (&Position, &Po
     let control = pass.program().control();
     let at = |s: f64| {
         let there = control.between(meant.0, meant.1, s).zip(control.between(written.0, written.1, s));
-        there.map_or(0.0, |(meant, sent)| pass.corrector().error(control, &sent, &meant).m())
+        there.map_or(0.0, |(meant, sent)| pass.corrector().distance(control, &sent, &meant))
     };
     LOOKS.into_iter().map(at).fold(0.0, f64::max)
 }

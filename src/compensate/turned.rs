@@ -119,7 +119,7 @@ fn note(pass: &mut Pass, block: &Block, point: &Position, correction: &Correctio
     let choose = |i: usize| if rotary[i] { correction.written() } else { program.written() }.program()[i];
     let turned: Few<f64> = (0..rotary.len()).map(choose).collect();
     if let Some(q) = control.joints(&turned, correction.written().q()) {
-        let left = pass.corrector().error(control, &q, point.q()).m();
+        let left = pass.corrector().distance(control, &q, point.q());
         pass.report().largest_mid_line_m.take(left, block.line());
     }
 }

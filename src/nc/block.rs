@@ -235,9 +235,15 @@ impl Block {
     }
 
     fn edit(&mut self, range: Range<usize>, pieces: &[&str]) {
+        if self.patches.is_empty() {
+            self.patches.reserve(self.bytes.len() + 16);
+        }
         let start = self.patches.len();
         pieces.iter().for_each(|piece| self.patches.push_str(piece));
         let text = start..self.patches.len();
+        if self.edits.is_empty() {
+            self.edits.reserve(self.words.len());
+        }
         let at =
             self.edits.partition_point(|(other, _)| (other.start, other.end) <= (range.start, range.end));
         self.edits.insert(at, (range, text));

@@ -10,6 +10,9 @@ use super::number::Number;
 use super::token::{Kind, Token};
 use super::words::{How, Value, Word};
 
+/// Pieces of an ordinary line.
+const ORDINARY: usize = 8;
+
 /// Walks along one line.
 pub(super) struct Cutter<'a> {
     line: Line<'a>,
@@ -24,7 +27,8 @@ impl Cutter<'_> {
     /// Tokens and words of a line, with or without its line end.
     pub fn cut(bytes: &[u8], dialect: Dialect) -> (Vec<Token>, Vec<Word>) {
         let line = Line::new(bytes, dialect);
-        let mut cutter = Cutter { line, at: 0, tokens: Vec::new(), words: Vec::new(), unbalanced: false };
+        let (tokens, words) = (Vec::with_capacity(ORDINARY), Vec::with_capacity(ORDINARY));
+        let mut cutter = Cutter { line, at: 0, tokens, words, unbalanced: false };
         if bytes.starts_with(b"\xef\xbb\xbf") {
             cutter.at = 3;
         }

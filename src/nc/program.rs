@@ -14,6 +14,9 @@ use crate::error::{Error, Place, Result};
 /// Longest line that is read, bytes.
 pub const LONGEST_LINE: usize = 1 << 20;
 
+/// Bytes of an ordinary line.
+const ORDINARY_LINE: usize = 64;
+
 /// Lines and bytes at the start of a program from which its dialect is taken.
 const HEAD_LINES: usize = 200;
 const HEAD_BYTES: usize = 1 << 16;
@@ -139,7 +142,7 @@ impl<R: BufRead> Program<R> {
 
     /// The next line with its line end.
     fn read_line(&mut self) -> Result<Option<Vec<u8>>> {
-        let mut line = Vec::new();
+        let mut line = Vec::with_capacity(ORDINARY_LINE);
         loop {
             let part = match self.source.fill_buf() {
                 Ok(part) => part,
