@@ -139,9 +139,11 @@ impl<S: Scalar> Chain<S> {
         for (j, link) in self.links.iter().enumerate() {
             if j == self.workpiece_count {
                 sweep.b_from_w = behind;
-                behind = Pose::identity(like);
             }
-            let b_from_frame = behind * link.previous_from_frame;
+            let b_from_frame = match j == 0 || j == self.workpiece_count {
+                true => link.previous_from_frame,
+                false => behind * link.previous_from_frame,
+            };
             sweep.b_from_frame.push(b_from_frame);
             behind = link.behind(b_from_frame, q);
             sweep.b_from_carried.push(behind);
@@ -152,10 +154,13 @@ impl<S: Scalar> Chain<S> {
     /// `w_from_t` at the commands `q`, `docs/model.md` (10).
     pub fn w_from_t(&self, q: &[S]) -> Pose<S> {
         let (workpiece, tool) = self.links.split_at(self.workpiece_count);
-        let end = |links: &[Link<S>]| {
-            links
-                .iter()
-                .fold(Pose::identity(q[0]), |behind, link| link.behind(behind * link.previous_from_frame, q))
+        let end = |links: &[Link<S>]| match links {
+            [first, others @ ..] => {
+                others.iter().fold(first.behind(first.previous_from_frame, q), |behind, link| {
+                    link.behind(behind * link.previous_from_frame, q)
+                })
+            }
+            [] => Pose::identity(q[0]),
         };
         end(workpiece).inverse() * end(tool)
     }
@@ -167,19 +172,38 @@ impl<S: Scalar> Link<S> {
     fn behind(&self, b_from_frame: Pose<S>, q: &[S]) -> Pose<S> {
         let behind = match &self.joint {
             None => b_from_frame,
-            Some((kind, axis, drive)) => b_from_frame * joint_pose(*kind, *axis, displacement(drive, q)),
+            Some((kind, axis, drive)) => moved(b_from_frame, *kind, *axis, displacement(drive, q)),
         };
         self.carried.map_or(behind, |carried| behind * carried)
     }
 }
 
-/// `exp(xi q)` of one joint, `docs/model.md` (8).
+/// A frame and behind it `exp(xi q)` of one joint, `docs/model.md` (8). Along a coordinate axis that takes two columns.
 #[inline(always)]
-fn joint_pose<S: Scalar>(kind: JointKind, axis: Vec3<f64>, displacement: S) -> Pose<S> {
-    match kind {
-        JointKind::Prismatic => Pose::translation(axis.lift(displacement).times(displacement)),
-        JointKind::Revolute => Pose::turn(axis, displacement),
+fn moved<S: Scalar>(frame: Pose<S>, kind: JointKind, axis: Vec3<f64>, displacement: S) -> Pose<S> {
+    match (kind, axis.0.map(f64::abs)) {
+        (JointKind::Prismatic, _) => {
+            let way = frame.rotation * axis.lift(displacement).times(displacement);
+            Pose { rotation: frame.rotation, translation: frame.translation + way }
+        }
+        (_, [1.0, _, _]) => turned::<1, 2, S>(frame, displacement.scale(axis.0[0])),
+        (_, [_, 1.0, _]) => turned::<2, 0, S>(frame, displacement.scale(axis.0[1])),
+        (_, [_, _, 1.0]) => turned::<0, 1, S>(frame, displacement.scale(axis.0[2])),
+        _ => frame * Pose::turn(axis, displacement),
     }
+}
+
+/// A frame turned about its axis that comes before its axes `A` and `B`.
+#[inline(always)]
+fn turned<const A: usize, const B: usize, S: Scalar>(frame: Pose<S>, angle: S) -> Pose<S> {
+    let (sine, cosine) = angle.sin_cos();
+    let mut rotation = frame.rotation;
+    for row in &mut rotation.0 {
+        let (a, b) = (row[A], row[B]);
+        row[A] = a * cosine + b * sine;
+        row[B] = b * cosine - a * sine;
+    }
+    Pose { rotation, translation: frame.translation }
 }
 
 /// `s = Σ factor × command`, `docs/model.md` (9).

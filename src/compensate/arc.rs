@@ -110,7 +110,15 @@ impl Arc {
             _ => number("TURN")?.unwrap_or(0.0),
         };
         let sweep = sign * (sweep + TAU * more.round());
-        Ok(Arc { start: Few::from_slice(start), end: Few::from_slice(end), plane, centre, radius: [r0, r1], from, sweep })
+        Ok(Arc {
+            start: Few::from_slice(start),
+            end: Few::from_slice(end),
+            plane,
+            centre,
+            radius: [r0, r1],
+            from,
+            sweep,
+        })
     }
 
     /// Program coordinates at a part `s` of it; (C12).

@@ -11,8 +11,8 @@ use super::pass::Pass;
 use super::position::Position;
 use super::refusal::refuse;
 use super::tip_error::TipError;
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, Dialect, Motion};
 
 /// Lines are not made shorter than by this factor where the correction bends.

@@ -7,8 +7,8 @@ use super::output::put;
 use super::pass::Pass;
 use super::position::Position;
 use super::refusal::{line_text, refuse};
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, Distance, Motion};
 
 /// Corrects the place of a cycle, `target` (program coordinates, m or rad), and writes it.

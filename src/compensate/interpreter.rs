@@ -16,8 +16,8 @@ use super::setup::Setup;
 use super::target;
 use super::tool::Tool;
 use super::ways::Ways;
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::machine::Machine;
 use crate::nc::{Block, Dialect, How, Kind, Modes, Motion, MotionKind, State, Step};
 

@@ -13,9 +13,9 @@ use super::position::Position;
 use super::refusal::refuse;
 use super::style::{model_of, plain};
 use super::words;
-use crate::few::Few;
 use crate::chain::Chain;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, Feed, Motion, MotionKind, Number, Word};
 
 /// How the lines look beside their axis words.

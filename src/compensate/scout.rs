@@ -8,8 +8,8 @@ use super::interpreter::Interpreter;
 use super::model::Model;
 use super::position::Position;
 use super::subprograms::Follow;
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, Motion, MotionKind};
 
 /// A program that is followed as far as its first motions.

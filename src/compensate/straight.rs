@@ -11,8 +11,8 @@ use super::pass::Pass;
 use super::position::Position;
 use super::refusal::refuse;
 use super::turned;
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, Dialect, Motion, MotionKind};
 
 /// Parts of a straight move at which it is looked at.

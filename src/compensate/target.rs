@@ -6,8 +6,8 @@ use super::control::Control;
 use super::fault::CompensateFault;
 use super::places::Places;
 use super::refusal::refuse;
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, Dialect, Distance, How, Modes, Motion, MotionKind, Value};
 
 /// What a word means, modes included.

@@ -9,8 +9,8 @@ use super::interpreter::Interpreter;
 use super::position::Position;
 use super::refusal::refuse;
 use super::subprograms::Follow;
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::lie::Pose;
 use crate::nc::{Block, Motion, MotionKind};
 
@@ -104,8 +104,9 @@ impl<'a, M: Machine> Trace<'a, M> {
             None => {
                 self.machine.send(end.q(), &ways);
                 let control = self.program.control();
-                let way =
-                    (control.tip_pose(end.q()).translation - control.tip_pose(start.q()).translation).norm();
+                let tip_t = control.tip().translation;
+                let tip_w = |q: &[f64]| control.nominal().tool_point(q, tip_t);
+                let way = (tip_w(end.q()) - tip_w(start.q())).norm();
                 let turn: f64 = start.q().iter().zip(end.q()).map(|(a, b)| (a - b).abs()).sum();
                 // A turn is looked at every few degrees.
                 let places =

@@ -10,8 +10,8 @@ use super::pass::Pass;
 use super::position::Position;
 use super::style::{model_of, plain};
 use super::words;
-use crate::few::Few;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, Distance, Feed, Motion, Value};
 
 /// How far the tip may be off before a line makes up for it, m: as far as an arc usually is.

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::sync::mpsc;
 
 use serde::{Deserialize, Serialize};
 
@@ -176,13 +177,14 @@ pub fn verify_text(
     setup: &Setup,
     options: &VerifyOptions,
 ) -> Result<Verification> {
-    let meant = || Program::new("original", original.as_ref());
-    let written = || Program::new("compensated", compensated.as_ref());
+    let (original, compensated) = (original.as_ref(), compensated.as_ref());
+    let meant = || Program::new("original", original);
+    let written = || Program::new("compensated", compensated);
     check(calibrated, (&meant, &written), setup, options)
 }
 
 /// Opens a program anew.
-type Open<'o, R> = &'o dyn Fn() -> Result<Program<R>>;
+type Open<'o, R> = &'o (dyn Fn() -> Result<Program<R>> + Sync);
 
 fn check<A: BufRead, B: BufRead>(
     calibrated: &CalibratedMachine,
@@ -201,16 +203,12 @@ fn check<A: BufRead, B: BufRead>(
         read_as(&mut program, options.dialect, options.integer_unit);
         Ok::<_, Error>(program)
     };
-    let mut original = Survey::of(meant()?)?;
-    let mut compensated = Survey::of(written()?)?;
+    let (original, compensated) = rayon::join(|| Survey::of(meant()?), || Survey::of(written()?));
+    let (mut original, mut compensated) = (original?, compensated?);
     if !options.force {
         let origin = Origin::of(calibrated);
         compensated.refuse_foreign(Mark { program: original.fingerprint, origin })?;
     }
-    let meant = meant()?;
-    let start = Interpreter::new(machine, setup, meant.dialect());
-    let trace = Trace::new(start, Nominal(Chain::nominal(machine)), options.chord);
-    let mut meant = Moves::new(trace, Passage::new(meant, &mut original.calls));
     let start = |dialect| Interpreter::new(machine, setup, dialect);
     let mut model = model_of(calibrated);
     let mut first = vec![0; machine.commands().len()];
@@ -224,10 +222,51 @@ fn check<A: BufRead, B: BufRead>(
     model.restart(&first);
     let written = written()?;
     let trace = Trace::new(start(written.dialect()), Actual(model), options.chord);
-    let mut written = Moves::new(trace, Passage::new(written, &mut compensated.calls));
-    let mut found = compare(&mut meant, &mut written, options)?;
-    found.machine = machine.name().to_string();
-    Ok(found)
+    let mut written = Moves::of(followed(trace, Passage::new(written, &mut compensated.calls)));
+    std::thread::scope(|scope| {
+        // The original is followed beside what was written.
+        let (send, receive) = mpsc::sync_channel(BATCHES);
+        scope.spawn(move || {
+            let mut all = || {
+                let program = meant()?;
+                let nominal = Nominal(Chain::nominal(machine));
+                let trace = Trace::new(start(program.dialect()), nominal, options.chord);
+                let mut more = followed(trace, Passage::new(program, &mut original.calls));
+                // Nobody listens any more once the comparison has failed.
+                while let Some(legs) = more()? {
+                    if send.send(Ok(legs)).is_err() {
+                        break;
+                    }
+                }
+                Ok(())
+            };
+            if let Err(error) = all() {
+                let _ = send.send(Err(error));
+            }
+        });
+        let mut meant = Moves::of(move || receive.recv().ok().transpose());
+        let mut found = compare(&mut meant, &mut written, options)?;
+        found.machine = machine.name().to_string();
+        Ok(found)
+    })
+}
+
+/// Moves that are handed from thread to thread together, and how many such batches may wait.
+const BATCH: usize = 256;
+const BATCHES: usize = 4;
+
+/// The moves of a program, batch by batch.
+fn followed<'a, M: Machine, R: BufRead>(
+    mut trace: Trace<'a, M>,
+    mut passage: Passage<'_, R>,
+) -> impl FnMut() -> Result<Option<Vec<Leg>>> {
+    move || {
+        let mut legs = Vec::with_capacity(BATCH);
+        while legs.len() < BATCH && passage.step(&mut trace, &mut std::io::sink())? {
+            legs.extend(trace.take());
+        }
+        Ok(Some(legs).filter(|legs| !legs.is_empty()))
+    }
 }
 
 struct Nominal(Chain<f64>);
@@ -253,21 +292,23 @@ impl Machine for Actual<'_> {
 }
 
 /// The moves of a program, as far ahead as they are asked for.
-struct Moves<'a, 'c, M, R> {
-    trace: Trace<'a, M>,
-    passage: Passage<'c, R>,
+struct Moves<F> {
+    more: F,
     ahead: VecDeque<Leg>,
 }
 
-impl<'a, 'c, M: Machine, R: BufRead> Moves<'a, 'c, M, R> {
-    fn new(trace: Trace<'a, M>, passage: Passage<'c, R>) -> Self {
-        Moves { trace, passage, ahead: VecDeque::new() }
+impl<F: FnMut() -> Result<Option<Vec<Leg>>>> Moves<F> {
+    /// `more`: the next of them, `None` behind the last.
+    fn of(more: F) -> Self {
+        Moves { more, ahead: VecDeque::new() }
     }
 
     /// The move that comes behind so many others.
     fn ahead(&mut self, count: usize) -> Result<Option<&Leg>> {
-        while self.ahead.len() <= count && self.passage.step(&mut self.trace, &mut std::io::sink())? {
-            self.ahead.extend(self.trace.take());
+        while self.ahead.len() <= count
+            && let Some(legs) = (self.more)()?
+        {
+            self.ahead.extend(legs);
         }
         Ok(self.ahead.get(count))
     }
@@ -279,9 +320,9 @@ impl<'a, 'c, M: Machine, R: BufRead> Moves<'a, 'c, M, R> {
 }
 
 /// Each move of the original against the moves that were written for it: one, or the lines in the place of an arc or of a subdivided move.
-fn compare<A: BufRead, B: BufRead>(
-    meant: &mut Moves<Nominal, A>,
-    written: &mut Moves<Actual, B>,
+fn compare(
+    meant: &mut Moves<impl FnMut() -> Result<Option<Vec<Leg>>>>,
+    written: &mut Moves<impl FnMut() -> Result<Option<Vec<Leg>>>>,
     options: &VerifyOptions,
 ) -> Result<Verification> {
     let mut found = Verification::default();
@@ -333,10 +374,10 @@ fn compare<A: BufRead, B: BufRead>(
 }
 
 /// How many of the written moves belong to a move of the original: as many as lead along its path to its end.
-fn counterpart<R: BufRead>(
+fn counterpart(
     leg: &Leg,
     path: &[Vec3<f64>],
-    written: &mut Moves<Actual, R>,
+    written: &mut Moves<impl FnMut() -> Result<Option<Vec<Leg>>>>,
     options: &VerifyOptions,
 ) -> Result<usize> {
     let goal = leg.tips.last().filter(|_| matches!(leg.sort, Sort::Straight | Sort::Arc));

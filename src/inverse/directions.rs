@@ -72,15 +72,11 @@ impl Equations {
     /// Adds the smallest step that closes the error, if every direction is stronger than this part of the largest and than this size:
     /// `Aᵀ (A Aᵀ)⁻¹ e`, which is what [`Directions::step`] comes to there. Otherwise the step stays as it is, and it takes directions to
     /// say more.
-    pub fn step_if_strong(
-        &self,
-        error: &[f64; MOST],
-        (part, size): (f64, f64),
-        step: &mut [f64],
-    ) -> bool {
+    pub fn step_if_strong(&self, error: &[f64; MOST], (part, size): (f64, f64), step: &mut [f64]) -> bool {
         let n = self.count;
         // `A Aᵀ = L Lᵀ`, and `L⁻¹`: the squares of its elements add up to the inverse squares of all singular values.
-        let (mut lower, mut inverse, mut trace, mut weakest) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST], 0.0, 0.0);
+        let (mut lower, mut inverse, mut trace, mut weakest) =
+            ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST], 0.0, 0.0);
         for i in 0..n {
             for j in 0..=i {
                 let known = dot(&lower[i][..j], &lower[j][..j]);
@@ -270,5 +266,29 @@ mod tests {
             }
         }
         assert!(of(2, 2, |_, _| f64::NAN).directions().parts.is_empty());
+    }
+
+    #[test]
+    fn strong_equations_are_solved_as_their_directions_solve_them_and_weak_ones_are_left() {
+        let full = |k: usize, c: usize| (1.3 * (k as f64 + 1.0) * (c as f64 + 1.7)).sin();
+        let lost = |k: usize, c: usize| if k == 1 { 2.0 * full(0, c) } else { full(k, c) };
+        let error = [0.3, -0.2, 0.5, 0.1, -0.7, 0.4];
+        for (count, columns) in [(2, 5), (3, 3), (6, 9), (1, 1), (0, 4)] {
+            let directions = of(count, columns, full).directions();
+            let weakest = directions.parts.last().map_or(f64::INFINITY, |part| part.size);
+            let mut by_directions = vec![0.0; columns];
+            directions.step(&error, &vec![0.0; columns], 0.0, &mut by_directions);
+            let mut at_once = vec![0.0; columns];
+            assert!(of(count, columns, full).step_if_strong(&error, (0.0, 0.3 * weakest), &mut at_once));
+            for (a, b) in at_once.iter().zip(&by_directions) {
+                assert!((a - b).abs() < 1e-10 * norm(&by_directions), "{count} x {columns}");
+            }
+            let mut step = vec![0.0; columns];
+            let too_much = (0.0, 1.01 * weakest);
+            assert!(count == 0 || !of(count, columns, full).step_if_strong(&error, too_much, &mut step));
+            assert!(count < 2 || !of(count, columns, lost).step_if_strong(&error, (1e-6, 0.0), &mut step));
+            assert!(step.iter().all(|x| *x == 0.0));
+        }
+        assert!(!of(2, 2, |_, _| f64::NAN).step_if_strong(&error, (0.0, 0.0), &mut [0.0; 2]));
     }
 }

@@ -160,3 +160,40 @@ fn of_digits(mut number: u64, places: usize) -> String {
     }
     String::from_utf8_lossy(&text[at..]).into_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Numbers as programs have them, and some that lie on the edge between two roundings.
+    fn number() -> impl Strategy<Value = f64> {
+        let edge =
+            (0u64..2_000_000, 0u32..7).prop_map(|(n, places)| (n as f64 + 0.5) / 10f64.powi(places as i32));
+        prop_oneof![
+            0.0..1e4f64,
+            0.0..1e-3f64,
+            1e8..1e18f64,
+            edge,
+            Just(0.0),
+            Just(f64::NAN),
+            Just(f64::INFINITY)
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn decimals_are_those_of_the_standard_library(value in number(), places in 0usize..12, below in any::<bool>()) {
+            let value = if below { -value } else { value };
+            prop_assert_eq!(fixed(value, places), format!("{value:.places$}"));
+        }
+
+        #[test]
+        fn values_are_those_of_the_standard_library(text in "[+-]?[0-9]{0,12}\\.?[0-9]{0,12}") {
+            let exact: Option<f64> = text.parse().ok();
+            let read = Number::parse(text.as_bytes(), Dialect::Rs274).map(|n| n.value);
+            prop_assert_eq!(read.map(f64::to_bits), exact.map(f64::to_bits));
+        }
+    }
+}

@@ -62,7 +62,8 @@ impl State {
     pub fn apply(&mut self, block: &Block) -> Result<Step> {
         let words = self.axis_words(block);
         // Only a block that names an axis twice may have to be taken back.
-        let double = twice(&words).map(|double| (double, self.modes.clone(), self.axes.coordinates().to_vec()));
+        let double =
+            twice(&words).map(|double| (double, self.modes.clone(), self.axes.coordinates().to_vec()));
         let mut effects = Effects::new(self.dialect, &mut self.modes, &mut self.axes);
         effects.names(block);
         effects.codes(block, words.iter().any(|named| named.first.is_some()));
