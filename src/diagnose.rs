@@ -38,6 +38,7 @@ mod parts;
 mod passing;
 mod placebo;
 mod polish;
+mod propose;
 mod reach;
 mod refine;
 mod relinearised;
@@ -71,6 +72,9 @@ pub use names::LikelyName;
 pub use not_tried::NotTried;
 pub use outliers::{Outliers, WithoutOutliers};
 pub use parts::UnnamedPart;
+pub use propose::Proposal;
+#[cfg(feature = "cli")]
+pub(crate) use propose::library_of;
 pub use set_ups::{LeftOutRms, SetUpLeftOut};
 pub use shared::Companion;
 pub use side_branches::UnseenSideBranch;
@@ -93,6 +97,8 @@ use side_branches::unseen;
 pub struct DiagnoseOptions {
     /// How the constant geometry is identified.
     pub options: CalibrateOptions,
+    /// Whether families are proposed for what has no name, [`Diagnosis::proposals`].
+    pub propose: bool,
 }
 
 impl DiagnoseOptions {
@@ -100,6 +106,13 @@ impl DiagnoseOptions {
     #[must_use]
     pub fn with_options(mut self, options: CalibrateOptions) -> Self {
         self.options = options;
+        self
+    }
+
+    /// The same with families proposed for what has no name.
+    #[must_use]
+    pub fn with_proposals(mut self) -> Self {
+        self.propose = true;
         self
     }
 }
@@ -118,7 +131,8 @@ pub fn diagnose(
     let (whole, machine) = (machine, &as_seen_in(machine, recordings));
     let facts = RecordingFacts::of(machine, recordings)?;
     let candidates = library.candidates(machine, &facts);
-    let case = Case { machine, recordings, library, facts: &facts, options: request.options, progress };
+    let (options, propose) = (request.options, request.propose);
+    let case = Case { machine, recordings, library, facts: &facts, options, propose, progress };
     let Told { mut diagnosis, may_be_late } = case.told(&candidates.all)?;
     if let Some(joint) = may_be_late {
         progress("looking at it as at an axis that is late");

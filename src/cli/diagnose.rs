@@ -5,16 +5,17 @@ use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
 use crate::circular::{CircularTest, circular_tests};
-use crate::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
+use crate::diagnose::{DiagnoseOptions, Diagnosis, HeldOutPair, diagnose, library_of};
 use crate::effects::Library;
 use crate::feature::as_seen_in;
 use crate::identify::{calibrate, declared};
 use crate::machine::Machine;
 use crate::recording::Recording;
+use crate::units::Quantity;
 
 use super::Common;
 use super::files::Output;
-use super::output::{Outcome, open_machine, open_recordings, write_whole};
+use super::output::{Outcome, angle, length, open_machine, open_recordings, write_whole};
 use super::report::{Frame, Measured, Source, of_diagnosis, of_measured, render, write_page};
 use super::verdict;
 
@@ -32,6 +33,9 @@ pub(crate) struct Args {
     /// Leave a family out, with its forms; one that --effects brings stays
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
+    /// Where to write families of effects for what has no name: the shortest law for each, for `--effects`
+    #[arg(long, value_name = "NEW.ron")]
+    propose: Option<Output>,
     /// Where to write the calibrated machine with what was found
     #[arg(short, long, value_name = "CALIBRATED.ron")]
     output: Option<Output>,
@@ -60,12 +64,12 @@ pub(crate) fn judged(
     machine: &Machine,
     recordings: &[Recording],
     library: &Library,
+    request: &DiagnoseOptions,
     (wanted, force): (bool, bool),
     progress: &dyn Fn(&str),
 ) -> Outcome<(Diagnosis, Option<CalibratedMachine>, Option<String>)> {
-    let request = DiagnoseOptions::default();
     let note = verdict::beforehand(machine, recordings, force, progress)?;
-    let mut found = diagnose(machine, recordings, library, &request, progress)?;
+    let mut found = diagnose(machine, recordings, library, request, progress)?;
     let model = match wanted || found.has_more_than_geometry() {
         true => Some(found.model(machine, recordings, request.options, progress)?),
         false => None,
@@ -88,8 +92,10 @@ pub(crate) fn run(args: &Args) -> Outcome {
         }
     }
     let progress = args.common.progress();
+    let mut request = DiagnoseOptions::default();
+    request.propose = args.propose.is_some();
     let (diagnosis, model, note) =
-        judged(&machine, &recordings, &library, (args.output.is_some(), args.force), &|text| {
+        judged(&machine, &recordings, &library, &request, (args.output.is_some(), args.force), &|text| {
             progress.say(text)
         })?;
     let mut notes: Vec<String> = note.into_iter().collect();
@@ -134,6 +140,16 @@ pub(crate) fn run(args: &Args) -> Outcome {
         })?;
         let _ = writeln!(text, "\nwritten to {}", path.display());
     }
+    if let Some(path) = &args.propose {
+        text += &proposed(&diagnosis);
+        if let Some(library) = library_of(&diagnosis.proposals) {
+            write_whole(path, |out| {
+                let _ = out.write_all(library.as_bytes());
+                Ok(())
+            })?;
+            let _ = writeln!(text, "proposals written to {}", path.display());
+        }
+    }
     if let (Some(path), Some(page)) = (&args.report, page) {
         write_page(path, &page)?;
         let _ = writeln!(text, "\nreport written to {}", path.display());
@@ -144,4 +160,32 @@ pub(crate) fn run(args: &Args) -> Outcome {
         diagnosis: &diagnosis,
         circular_tests: &circular,
     })
+}
+
+/// What is proposed, in words.
+fn proposed(diagnosis: &Diagnosis) -> String {
+    if diagnosis.proposals.is_empty() {
+        return "\nnothing is proposed: the model has no part without a name\n".into();
+    }
+    let mut text = String::new();
+    for proposal in &diagnosis.proposals {
+        let beside = proposal.partner.as_ref().map_or(String::new(), |partner| format!(" with {partner}"));
+        let what = if proposal.free { "the free function itself" } else { "a law" };
+        let _ = write!(
+            text,
+            "\n{} at {}{beside}: {what}, {}",
+            proposal.name,
+            proposal.at,
+            proposal.law.join("; ")
+        );
+        for (quantity, HeldOutPair { before, after }) in proposal.held_out_rms.there() {
+            let shown = |value: f64| if quantity == Quantity::Angle { angle(value) } else { length(value) };
+            let _ = write!(text, "\n  left-out stretches {} -> {}", shown(before), shown(after));
+            if let Some(free) = proposal.free_held_out_rms[quantity] {
+                let _ = write!(text, " (with any function: {})", shown(free.after));
+            }
+        }
+        text.push('\n');
+    }
+    text
 }

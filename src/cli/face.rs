@@ -12,6 +12,7 @@ use super::report;
 use super::{calibrate, diagnose};
 use crate::calibration::CalibratedMachine;
 use crate::circular::circular_tests;
+use crate::diagnose::DiagnoseOptions;
 use crate::effects::Library;
 use crate::error::Error;
 use crate::identify::{CalibrateOptions, ErrorModel, declared};
@@ -106,7 +107,9 @@ pub fn diagnosed(
     library: &Library,
     force: bool,
 ) -> Result<(CalibratedMachine, String), Refusal> {
-    let (diagnosis, model, _) = diagnose::judged(machine, recordings, library, (true, force), &|_| ())?;
+    let request = DiagnoseOptions::default();
+    let (diagnosis, model, _) =
+        diagnose::judged(machine, recordings, library, &request, (true, force), &|_| ())?;
     let model = match model {
         Some(model) => model,
         None => declared(machine, recordings)?,

@@ -6,6 +6,7 @@ use super::approaches::StandsStill;
 use super::finding::Finding;
 use super::not_tried::NotTried;
 use super::outliers::{Outliers, WithoutOutliers};
+use super::propose::Proposal;
 use super::search::Search;
 use super::set_ups::SetUpLeftOut;
 use super::shared::Companion;
@@ -57,6 +58,9 @@ pub struct Diagnosis {
     pub stand_still: Vec<StandsStill>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
+    /// Families for that, where they were asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub proposals: Vec<Proposal>,
     /// Part of the structure left over by geometry that is no family's shape, 0 to 1, where something was found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape_share: Option<f64>,

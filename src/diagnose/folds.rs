@@ -51,6 +51,13 @@ pub(super) fn pair(search: &Search, told: &[ModelTerm], i: usize) -> ByQuantity<
     })
 }
 
+/// RMS of stretches that are left out, with so many of these effects.
+pub(super) fn rms_left_out(search: &Search, told: &[ModelTerm], first: usize) -> ByQuantity<Option<f64>> {
+    let Some(folds) = Folds::new(search, told) else { return ByQuantity::default() };
+    let left = folds.left_out(search, &|effect| effect < first);
+    ByQuantity::of(|quantity| rms_of(search, &left, quantity == Quantity::Angle))
+}
+
 /// By how much the squares of stretches that are left out fall with effect `i`, in units of their mean without it, and the standard error
 /// of that, from how much the stretches differ. `None` where there are too few rows.
 ///

@@ -70,7 +70,7 @@ pub(super) fn least_foretold(search: &Search, all: &[ModelTerm]) -> Option<usize
 
 /// Free functions as candidates, beside the families of a search: what is no name for all that is there may be one for a part of it.
 pub(super) struct Unnamed {
-    library: Library,
+    pub(super) library: Library,
     pub(super) candidates: Vec<Candidate>,
     /// The first of them that is a free function.
     pub(super) first: usize,
@@ -79,7 +79,11 @@ pub(super) struct Unnamed {
 
 impl Unnamed {
     pub fn beside(search: &Search, machine: &Machine, facts: &RecordingFacts) -> Self {
-        let library = Library::unnamed();
+        Unnamed::of(Library::unnamed(), search, machine, facts)
+    }
+
+    /// The families of another library in place of free functions.
+    pub fn of(library: Library, search: &Search, machine: &Machine, facts: &RecordingFacts) -> Self {
         let mut candidates = search.candidates.to_vec();
         let first = candidates.len();
         candidates.extend(library.candidates(machine, facts).all);

@@ -16,6 +16,7 @@ use super::outbid::outbid;
 use super::outliers;
 use super::parts::{Unnamed, UnnamedPart, least_foretold};
 use super::placebo::{Placebo, placebo};
+use super::propose;
 use super::search::{Hypothesis, ModelTerm, Search, all_but};
 use super::series::Standing;
 use super::set_ups;
@@ -71,12 +72,13 @@ pub(super) fn report(
     in_model: &[ModelTerm],
     (machine, library, facts): (&Machine, &Library, &RecordingFacts),
     noise: &[Noise],
+    propose: bool,
 ) -> Diagnosis {
     let linear = search.rows.linear;
     let mut shares = search.shares(in_model);
     let mut doubt = match doubt(search, in_model, machine, &shares, noise) {
         Some(Doubt { but: Some(i), .. }) => {
-            return report(search, &in_model[i..=i], (machine, library, facts), noise);
+            return report(search, &in_model[i..=i], (machine, library, facts), noise, propose);
         }
         doubt => doubt,
     };
@@ -139,6 +141,7 @@ pub(super) fn report(
     let search = wide.as_ref().unwrap_or(search);
     let (mut parts, mut of_parts, mut unexplained) = (Vec::new(), Vec::new(), None);
     let mut of_companions = None;
+    let mut proposals = Vec::new();
     if let Some((unnamed, doubt)) = unnamed.as_ref().zip(doubt) {
         let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
         let (modelled, only_told) = unnamed.parts(search, &known);
@@ -176,6 +179,10 @@ pub(super) fn report(
             }
         }
         if is_modelled {
+            if propose {
+                let given = (machine, library, facts);
+                proposals = propose::proposals(search, unnamed, (&known, &shown), &names, given);
+            }
             parts = shown;
         }
         let found = search.beside_names(&known);
@@ -218,6 +225,7 @@ pub(super) fn report(
         shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
         findings,
         unexplained,
+        proposals,
         companions: (companions.iter())
             .map(|effect| &search.candidates[effect.candidate])
             .map(|c| Companion {

@@ -37,6 +37,8 @@ pub(super) struct Case<'a> {
     pub library: &'a Library,
     pub facts: &'a RecordingFacts,
     pub options: CalibrateOptions,
+    /// Whether families are proposed for what has no name.
+    pub propose: bool,
     pub progress: &'a dyn Fn(&str),
 }
 
@@ -109,7 +111,8 @@ impl Case<'_> {
             }
             let judged = judge(&in_model);
             let report = |search: &Search, in_model: &[ModelTerm]| -> Told {
-                let diagnosis = report::report(search, in_model, (machine, library, facts), &noise);
+                let diagnosis =
+                    report::report(search, in_model, (machine, library, facts), &noise, self.propose);
                 Told { diagnosis, may_be_late: lag::may_be_late(search, in_model) }
             };
             if moves < MOVES && !in_model.is_empty() {

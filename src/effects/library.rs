@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 /// The library that comes with the crate.
 const STANDARD: &str = include_str!("library.ron");
 const UNNAMED: &str = include_str!("unnamed.ron");
+const PRIMITIVES: &str = include_str!("primitives.ron");
 /// Where the form of a library is taught.
 const GUIDE: &str = "docs/effects.md shows the form of a library of effects";
 
@@ -53,6 +54,12 @@ impl Library {
     pub(crate) fn unnamed() -> Self {
         let none = Library { families: Vec::new(), added: 0 };
         none.with_text("unnamed.ron", UNNAMED).expect("a test reads it")
+    }
+
+    /// Terms of which laws for that are put together.
+    pub(crate) fn primitives() -> Self {
+        let none = Library { families: Vec::new(), added: 0 };
+        none.with_text("primitives.ron", PRIMITIVES).expect("a test reads it")
     }
 
     /// This library with the families of a file added; those whose name it has already are replaced.
@@ -192,5 +199,17 @@ fn join(parent: &str, path: &str) -> String {
         format!("{parent}{path}")
     } else {
         format!("{parent}.{path}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_comes_with_the_crate_is_read() {
+        for library in [Library::standard(), Library::unnamed(), Library::primitives()] {
+            assert!(!library.families().is_empty());
+        }
     }
 }

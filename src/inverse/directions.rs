@@ -99,7 +99,8 @@ impl Equations {
         }
         let least = (part * part * trace).max(size * size);
         // Not a number is not strong.
-        if !(weakest * least < 1.0) {
+        let is_strong = weakest * least < 1.0;
+        if !is_strong {
             return false;
         }
         let mut by = [0.0; MOST];
