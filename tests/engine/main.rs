@@ -25,6 +25,7 @@ mod mounted;
 mod names;
 mod paper;
 mod pieces;
+mod proposals;
 mod recovery;
 mod resolvers;
 mod rivals;
