@@ -60,7 +60,7 @@ pub(crate) struct Args {
     time_zero: Option<String>,
     /// The path that ran, where the table has readings alone: a test with its options as `kincal simulate` has them, 'BK4 --length 100mm
     /// --feed 500mm/min', or an NC program, 'part.nc --length 100mm'
-    #[arg(long, value_name = "TEST ...|PROGRAM.nc ...", requires = "machine")]
+    #[arg(long, value_name = "TEST ...|PROGRAM.nc", requires = "machine")]
     path: Option<String>,
     /// Readings a second, where such a table has no column of time; found by the path's feed
     #[arg(long, value_name = "RATE", value_parser = rate, requires = "path")]

@@ -358,7 +358,7 @@ impl Trial<'_> {
         let (h00, h11) = (curvature([1.0, 0.0], a), curvature([0.0, 1.0], b));
         let h01 = 0.25 * (curvature([1.0, 1.0], both) - curvature([1.0, -1.0], apart));
         let determinant = h00 * h11 - h01 * h01;
-        if !(determinant > 1e-9 * h00 * h11) {
+        if determinant.is_nan() || determinant <= 1e-9 * h00 * h11 {
             return None;
         }
         Some([h11, h00].map(|h| (2.0 * scale * h / determinant).sqrt()))

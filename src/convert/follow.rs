@@ -366,7 +366,7 @@ fn judge(
         let mend = "check that this path ran; capture both senses of travel with a stop between, and a standstill before and behind; tell the rate by `--sample-rate`";
         return Err((what, mend));
     }
-    if found.errors.iter().any(|e| !(*e < UNSURE * duration)) {
+    if found.errors.iter().any(|e| e.is_nan() || *e >= UNSURE * duration) {
         let part = found.errors[0].max(found.errors[1]) / duration * path.duration();
         let what =
             format!("the path can be shifted by {:.1} ms without a difference that is seen", part * 1e3);

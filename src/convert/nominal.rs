@@ -1,10 +1,6 @@
 //! The path that a machine was told to run, over time, where a table has only what was read meanwhile.
 
 use crate::error::{Error, Result};
-use crate::simulate::Course;
-
-/// More commands than these are not held.
-const MOST: usize = 4_000_000;
 
 /// Commands over time, and what the head of a recording says of the points that were measured.
 #[non_exhaustive]
@@ -43,25 +39,6 @@ impl Nominal {
             );
         }
         Ok(Nominal { step, commands, head })
-    }
-
-    /// A course, sample by sample at its own rate; `approach`: with what is not recorded at its beginning.
-    pub(crate) fn of(course: &dyn Course, rate: f64, approach: bool, head: Vec<String>) -> Result<Nominal> {
-        let mut commands = Vec::new();
-        for sample in course.samples()? {
-            let sample = sample?;
-            if commands.is_empty() && !approach && !sample.recorded {
-                continue;
-            }
-            commands.push(sample.q);
-            if commands.len() > MOST {
-                return Err(Error::Motion {
-                    what: format!("the path takes more than {MOST} samples"),
-                    mend: "give the part of it that was measured, or a lower `--rate`".into(),
-                });
-            }
-        }
-        Nominal::new(rate.recip(), commands, head)
     }
 
     /// How long the path takes, s.

@@ -15,6 +15,8 @@ use crate::units::Unit;
 
 /// Commands of the path a second, where nothing is said.
 const RATE: f64 = 500.0;
+/// More commands than these are not held.
+const MOST: usize = 4_000_000;
 const FORM: &str = "write a test with its options as `kincal simulate` has them, 'circle --plane x,y --length 150mm --feed 1000mm/min', \
                     or an NC program with its options, 'part.nc --feed 500mm/min --length 100mm'";
 
@@ -50,7 +52,19 @@ pub(crate) fn path(machine: &Machine, text: &str) -> Outcome<Nominal> {
     let lines = head.lines().filter_map(|line| line.strip_prefix("# "));
     let own = lines.filter(|line| !line.starts_with("machine:") && !line.starts_with("measurement:"));
     let own = own.map(str::to_string).collect();
-    Ok(Nominal::of(&*run.course, rate, !args.without_approach, own)?)
+    let mut commands = Vec::new();
+    for sample in run.course.samples()? {
+        let sample = sample?;
+        if commands.is_empty() && args.without_approach && !sample.recorded {
+            continue;
+        }
+        commands.push(sample.q);
+        if commands.len() > MOST {
+            let what = format!("--path: the path takes more than {MOST} samples");
+            return Err(usage(what, "give the part of it that was measured, or a lower `--rate`"));
+        }
+    }
+    Ok(Nominal::new(rate.recip(), commands, own)?)
 }
 
 /// The file that a path names.
