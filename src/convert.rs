@@ -3,8 +3,10 @@
 //! [`open`] reads a table, finds out from its headings what its columns are, and writes a recording of each marker in it. What headings do
 //! not say is not guessed: an error lists what has to be told. A [`Map`] says all of it; `docs/convert.md`.
 
+mod align;
 mod cell;
 mod draft;
+mod follow;
 mod form;
 mod groups;
 mod guess;
@@ -14,10 +16,12 @@ mod map;
 mod matrix;
 mod measured;
 mod moment;
+mod nominal;
 mod npy;
 mod plan;
 mod renishaw;
 mod rotation;
+mod shapes;
 mod table;
 mod target;
 mod text;
@@ -28,9 +32,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub(crate) use cell::plain;
+pub use follow::Alignment;
 pub(crate) use form::Separator;
 pub(crate) use heading::{Heading, Stated};
 pub use map::{Map, Part};
+pub use nominal::Nominal;
 pub use write::Written;
 
 use crate::error::{Error, Place, Result};
@@ -75,6 +81,10 @@ pub struct Request {
     pub separator: Option<String>,
     /// `point` or `comma`.
     pub decimal: Option<String>,
+    /// The path that ran, where the table has no positions of the joints.
+    pub path: Option<Nominal>,
+    /// Readings a second, where such a table has no column of time.
+    pub sample_rate: Option<f64>,
 }
 
 /// Recordings that were made of a table.
@@ -87,6 +97,8 @@ pub struct Converted {
     pub map: String,
     /// What was guessed or left out, one sentence each.
     pub told: Vec<String>,
+    /// Where the path lies in the readings, where one was told.
+    pub alignment: Option<Alignment>,
 }
 
 /// Reads the table at `path`.
@@ -174,6 +186,17 @@ pub fn read(
     if machine.is_none() {
         told.push("not read back: `--machine` would say whether it is a recording of that machine".into());
     }
-    let recordings = write::all(&known, &table, machine, &mut told)?;
-    Ok(Converted { recordings, map: known.map.ron(&told), told })
+    let Some(path) = &request.path else {
+        let recordings = write::all(&known, &table, machine, &mut told)?;
+        return Ok(Converted { recordings, map: known.map.ron(&told), told, alignment: None });
+    };
+    let Some(machine) = machine else {
+        let mend = "give the machine that ran it, `--machine MACHINE.ron`";
+        return Err(Error::mistake(Place::file(file), "a path without its machine", mend));
+    };
+    let map = known.map.clone();
+    let followed = follow::follow(&table, known, machine, path, request.sample_rate)?;
+    told.extend(followed.told);
+    let recordings = write::all(&followed.known, &followed.table, Some(machine), &mut told)?;
+    Ok(Converted { recordings, map: map.ron(&told), told, alignment: Some(followed.alignment) })
 }

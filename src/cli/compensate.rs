@@ -14,7 +14,7 @@ use super::Common;
 use super::files::Output;
 use super::output::{Failure, Outcome, angle, count, length, open_machine, write_checked};
 use super::program::{DialectWord, IntegerWord, at, departures, dialect_of, integer_unit_of, tolerance};
-use super::report::{Frame, Source, of_compensated, write_page};
+use super::report::{Frame, Source, of_compensated, of_compensation, write_page};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -164,12 +164,14 @@ pub(crate) fn run(args: &Args) -> Outcome {
         let _ = writeln!(text, "report written to {}", path.display());
     }
     args.common.say(&text)?;
-    args.common.write_json(&Told { report, verification: verified })
+    args.common.write_json(&Told { verdict: of_compensation(&report), report, verification: verified })
 }
 
 /// What is told in JSON.
 #[derive(serde::Serialize)]
 struct Told {
+    /// What the program would be off, and what is left, in a sentence.
+    verdict: String,
     #[serde(flatten)]
     report: Report,
     #[serde(skip_serializing_if = "Option::is_none")]

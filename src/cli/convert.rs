@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::convert::{Request, Written, open};
+use crate::convert::{Nominal, Request, Written, open};
 use crate::machine::Machine;
 use serde_json::json;
 
 use super::Common;
 use super::files::{Files, Output};
 use super::output::{Failure, Outcome, count, open_machine, write_whole};
+use super::simulate;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -57,6 +58,13 @@ pub(crate) struct Args {
     /// Time stamp at which t is 0; the first one where stamps count from 1970 or are dates
     #[arg(long, value_name = "STAMP", conflicts_with = "map")]
     time_zero: Option<String>,
+    /// The path that ran, where the table has readings alone: a test with its options as `kincal simulate` has them, 'BK4 --length 100mm
+    /// --feed 500mm/min', or an NC program, 'part.nc --length 100mm'
+    #[arg(long, value_name = "TEST ...|PROGRAM.nc", requires = "machine")]
+    path: Option<String>,
+    /// Readings a second, where such a table has no column of time; found by the path's feed
+    #[arg(long, value_name = "RATE", value_parser = rate, requires = "path")]
+    sample_rate: Option<f64>,
     /// The joint that a file of a laser is about
     #[arg(long, value_name = "JOINT")]
     joint: Option<String>,
@@ -88,9 +96,23 @@ fn pair(text: &str) -> Result<(String, String), String> {
     Ok((key.trim().into(), value.trim().into()))
 }
 
+/// `250Hz`, `1kHz`, `250`.
+fn rate(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let (number, times) = match (text.strip_suffix("kHz"), text.strip_suffix("Hz")) {
+        (Some(number), _) => (number, 1e3),
+        (None, Some(number)) => (number, 1.0),
+        (None, None) => (text, 1.0),
+    };
+    let rate = number.trim().parse::<f64>().ok().map(|rate| rate * times);
+    rate.filter(|rate| (1e-3..=1e9).contains(rate)).ok_or("write readings a second: 250Hz".into())
+}
+
 impl Args {
-    fn request(&self) -> Request {
+    fn request(&self, path: Option<Nominal>) -> Request {
         Request {
+            path,
+            sample_rate: self.sample_rate,
             map: self.map.clone(),
             measurement: self.measurement.clone(),
             columns: self.column.clone(),
@@ -123,9 +145,17 @@ fn path_of(output: &Path, recording: &Written) -> PathBuf {
 }
 
 pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
+    // A program that the path names is an input as any other.
+    let ran = args.path.as_deref().and_then(simulate::input_of);
+    let files = &files.with_inputs("--path", &ran.into_iter().collect::<Vec<_>>());
+    files.check()?;
     let machine =
         (args.machine.as_ref()).map(|path| open_machine(path, |path| Machine::open(path))).transpose()?;
-    let converted = open(&args.file, machine.as_ref(), &args.request())?;
+    let path = match (&args.path, &machine) {
+        (Some(text), Some(machine)) => Some(simulate::path(machine, text)?),
+        _ => None,
+    };
+    let converted = open(&args.file, machine.as_ref(), &args.request(path))?;
     let paths: Vec<PathBuf> = converted.recordings.iter().map(|r| path_of(&args.output, r)).collect();
     // The names of several come from the markers, and are seen only now.
     files.with_outputs("--output", &paths).check()?;
@@ -173,5 +203,9 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
             json!({"file": path.to_string_lossy(), "marker": r.marker, "rows": r.rows, "with_gaps": r.with_gaps})
         })
         .collect();
-    args.common.write_json(&json!({"recordings": recordings, "map": converted.map, "told": converted.told}))
+    let mut result = json!({"recordings": recordings, "map": converted.map, "told": converted.told});
+    if let Some(alignment) = &converted.alignment {
+        result["alignment"] = json!(alignment);
+    }
+    args.common.write_json(&result)
 }

@@ -34,7 +34,7 @@ use crate::units::Rms;
 use table::prose;
 use track::{Stage, tracks};
 
-pub(crate) use headline::{of_diagnosis, of_fit};
+pub(crate) use headline::{of_compensation, of_diagnosis, of_fit};
 pub(crate) use provenance::Source;
 pub(crate) use terminal::{geometry_to_do, render};
 
@@ -175,12 +175,7 @@ pub(crate) fn of_compensated(
     ];
     let subtitle =
         format!("{}, {}.", count(report.blocks, "line", "lines"), count(report.moves, "move", "moves"));
-    page::page(
-        &format!("Compensation on {}", machine.name()),
-        &headline::of_compensation(report),
-        &subtitle,
-        &sections,
-    )
+    page::page(&format!("Compensation on {}", machine.name()), &of_compensation(report), &subtitle, &sections)
 }
 
 /// How far the tip is off before and after, and what of it nobody has measured.

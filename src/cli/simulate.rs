@@ -3,6 +3,7 @@
 mod amounts;
 mod args;
 mod build;
+mod path;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,7 @@ use super::output::{Kind, Outcome, count, length, open_machine, table, write_who
 pub(crate) use args::Args;
 use args::DropAs;
 use build::{Built, build, usage};
+pub(crate) use path::{input_of, path};
 
 pub(crate) fn run(args: &Args, named: &Files) -> Outcome {
     if let Some(option) = args.useless() {

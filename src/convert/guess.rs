@@ -23,7 +23,9 @@ pub(super) fn map(table: &Table, machine: &Machine, request: &Request) -> Result
     draft.map.names.clone_from(&request.names);
     named(&mut draft)?;
     time(&mut draft);
-    joints::commands(&mut draft);
+    if request.path.is_none() {
+        joints::commands(&mut draft);
+    }
     measured::take(&mut draft);
     draft.map.euler = draft.map.euler.take().or_else(|| {
         let turned = draft.map.columns.iter().any(|part| part.to.starts_with("euler"));

@@ -119,10 +119,15 @@ fn told(draft: &Draft) -> Option<String> {
 fn scalar(draft: &Draft, wants: &impl Fn(&str) -> bool) -> Option<(&'static str, usize)> {
     let kinds = [("d", "distance"), ("r", "distance"), ("s", "displacement")];
     let free = draft.free(Some(Quantity::Length));
-    kinds.into_iter().filter(|(_, word)| wants(word)).find_map(|(to, _)| {
+    let named = kinds.into_iter().filter(|(_, word)| wants(word)).find_map(|(to, _)| {
         let column = free.iter().find(|i| draft.table.headings[**i].name == to)?;
         Some((to, *column))
-    })
+    });
+    // Beside a path the one column of lengths can be nothing else.
+    match free[..] {
+        [column] if draft.request.path.is_some() && wants("distance") => named.or(Some(("d", column))),
+        _ => named,
+    }
 }
 
 fn reference(draft: &mut Draft, read: &[(String, Vec<usize>)]) {

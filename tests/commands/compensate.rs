@@ -225,6 +225,7 @@ fn what_was_written_is_read_anew_and_marked() {
     let json: serde_json::Value =
         serde_json::from_str(&bench.read("out.json").expect("written")).expect("JSON");
     assert_eq!(json["verification"]["judged"], 2, "{json}");
+    assert!(json["verdict"].as_str().is_some_and(|v| v.contains(" is left, says the model")), "{json}");
     assert_eq!(json["verification"]["departures"]["count"], 0, "{json}");
     let written = bench.read("out.nc").expect("written");
     assert!(written.lines().last().is_some_and(|line| line.starts_with("(KINCAL ")), "{written}");

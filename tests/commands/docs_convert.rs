@@ -25,6 +25,18 @@ fn words(line: &str) -> Vec<String> {
     parts.flat_map(cut).collect()
 }
 
+/// Every number as `0`.
+fn without_numbers(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        let digit = c.is_ascii_digit() || c == '.';
+        if !(digit && out.ends_with('0')) {
+            out.push(if digit { '0' } else { c });
+        }
+    }
+    out
+}
+
 #[test]
 fn every_command_of_the_page_on_tables_does_what_the_page_shows() {
     let folder = Folder::new("convert");
@@ -54,6 +66,11 @@ fn every_command_of_the_page_on_tables_does_what_the_page_shows() {
                     printed = if output.status.success() { out(&output) } else { err(&output) };
                     run += 1;
                 }
+            }
+            // Last digits hang on the processor.
+            ["text", "alike"] => {
+                assert_eq!(without_numbers(&printed), without_numbers(&text));
+                compared += 1;
             }
             ["text"] => {
                 assert_eq!(printed, text);

@@ -50,7 +50,7 @@ const TABLE: [Row; 18] = [
     ),
     row("new", &[], &["--joints"], &["--output", "--json"]),
     row("import", &[], &["FILE", "--hal"], &["--output", "--json"]),
-    row("convert", &[], &["FILE", "--machine", "--map"], &["--write-map", "--output", "--json"]),
+    row("convert", &[], &["FILE", "--machine", "--map", "--path"], &["--write-map", "--output", "--json"]),
     row("export", &["--to", "urdf"], &["CALIBRATED.ron", "--base-file"], &["--output", "--json"]),
     row("machines", &[], &[], &["--json"]),
     row("completions", &["bash"], &[], &[]),

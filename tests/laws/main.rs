@@ -13,6 +13,7 @@ mod batch;
 mod calibrated;
 mod compensate;
 mod convert;
+mod convert_path;
 mod effects;
 mod effects_in_files;
 mod export;

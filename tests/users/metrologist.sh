@@ -2,7 +2,7 @@
 # You measure machines. You have a trace of the control with the ballbar on an analogue input: nine tests, one after the other, and the
 # name of the machine. You get a report, and numbers that can be entered. `kincal` is on the path.
 #
-# A ballbar file that holds no positions of the axes cannot be converted: the trace has to have them. Where bar and control write apart,
+# Positions beside the readings are better than a path that is aligned to them (`kincal convert --path`). Where bar and control write apart,
 # start both by one trigger and paste the columns side by side first.
 set -euo pipefail
 data=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
