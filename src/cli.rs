@@ -15,6 +15,7 @@ mod failure;
 mod files;
 mod import;
 mod join;
+mod keep;
 mod location;
 mod machines;
 mod man;

@@ -1,4 +1,4 @@
-//! Recordings as the identification sees them: passes over chunks of samples, from memory while they fit, else from disk.
+//! Recordings as the identification sees them: passes over chunks of samples on all cores.
 
 use std::collections::HashSet;
 
@@ -15,10 +15,12 @@ use crate::sensor::Sensor;
 use crate::units::Quantity;
 use crate::variation::Varying;
 
-/// As many samples in all are kept in memory; larger sets are read again in every pass.
+/// Features of as many samples in all are kept in memory; those of larger sets are taken anew in every pass.
 const CACHED_SAMPLES: u64 = 2_000_000;
-/// Chunks that are worked on at a time when reading from disk.
-const BATCH: usize = 16;
+/// Chunks that are worked on at a time: what they add waits until all are done.
+const BATCH: usize = 64;
+/// The same where one thread goes along the path before.
+const BATCH_ALONG: usize = 16;
 
 /// A value that is known, or the index of the unknown that stands for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +154,7 @@ fn index_of<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
 }
 
 impl<'a> Sources<'a> {
-    /// Scans every recording once (all its rows are checked here) and keeps the samples if they are few enough.
+    /// Scans every recording once (all its rows are checked here), and keeps what varies with the path if the samples are few enough.
     pub fn new(
         recordings: &'a [Recording],
         machine: &'a Machine,
@@ -196,7 +198,8 @@ impl<'a> Sources<'a> {
                 source.beginning = Some(beginning);
             }
         }
-        if samples <= CACHED_SAMPLES {
+        let in_memory = |s: &Source| s.recording.stored().is_some_and(|stored| stored.is_in_memory());
+        if !varying.is_constant() && samples <= CACHED_SAMPLES && sources.all.iter().all(in_memory) {
             sources.cache()?;
         }
         Ok(sources)
@@ -382,10 +385,20 @@ impl<'a> Sources<'a> {
                 parts.into_iter().flatten().for_each(|part| merge(index, part));
                 continue;
             }
+            if let (Some(stored), None) = (source.recording.stored(), &source.beginning) {
+                let commands = self.machine.commands().len();
+                for from in (0..stored.len()).step_by(BATCH) {
+                    let part = |i| Ok(on(&Stretch::plain(stored.chunk(i)?, commands)));
+                    let batch = from..stored.len().min(from + BATCH);
+                    let parts = batch.into_par_iter().map(part).collect::<Result<Vec<_>>>()?;
+                    parts.into_iter().flatten().for_each(|part| merge(index, part));
+                }
+                continue;
+            }
             let mut stretches =
                 source.stretches(self.machine, self.varying, &self.dead_bands, &mut memories)?;
             loop {
-                let batch: Vec<Stretch> = stretches.by_ref().take(BATCH).collect::<Result<_>>()?;
+                let batch: Vec<Stretch> = stretches.by_ref().take(BATCH_ALONG).collect::<Result<_>>()?;
                 if batch.is_empty() {
                     break;
                 }

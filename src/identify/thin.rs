@@ -27,8 +27,9 @@ pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
     let mut all = Vec::new();
     // The chunks come in order, so the running number of a sample is known when they are merged.
     sources.pass(
-        |_, stretch| (stretch.chunk.commands.clone(), stretch.chunk.values.clone(), stretch.chunk.len),
-        |index, (q, values, len)| {
+        |_, stretch| stretch.chunk.clone(),
+        |index, chunk| {
+            let (q, values, len) = (&chunk.commands, &chunk.values, chunk.len);
             let source = &sources.all[index];
             let width = source.recording.value_count();
             let stride = source.summary.samples.div_ceil(MOST).max(1);

@@ -2,7 +2,9 @@
 
 use super::Recording;
 use super::column::Role;
-use super::reader::{Chunk, Pass};
+use super::kept::Keeping;
+use super::reader::{Chunk, Reading};
+use super::rows::Parsed;
 use super::text::Fail;
 use super::{RecordingFault as Fault, entry};
 use crate::error::Result;
@@ -88,51 +90,94 @@ impl Steps {
     }
 }
 
-/// Every chunk goes to `take`.
-pub(super) fn scan(recording: &Recording, mut take: impl FnMut(Chunk)) -> Result<Summary> {
-    let mut ranges = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.fixed.len()];
-    let (mut samples, mut dropped) = (0, 0);
-    let (mut time, mut steps) = (None, Steps::new());
-    let mut longest = (0.0, 0);
-    let mut chunks = Pass::start(recording)?.read();
-    for chunk in &mut chunks {
-        let chunk = chunk?;
-        let Chunk { len, lines, time: times, commands, dropped: left_out, .. } = &chunk;
-        samples += *len as u64;
-        dropped += left_out;
-        for row in commands.chunks_exact(ranges.len()) {
-            for (range, value) in ranges.iter_mut().zip(row) {
-                *range = (range.0.min(*value), range.1.max(*value));
+/// What pieces of a recording add up to.
+struct Counts {
+    rows: u64,
+    samples: u64,
+    dropped: u64,
+    drops: Vec<u64>,
+    worst: Vec<(f64, u64)>,
+    ranges: Vec<(f64, f64)>,
+    time: Option<(f64, f64)>,
+    steps: Steps,
+    /// The longest step and the line behind it.
+    longest: (f64, u64),
+}
+
+impl Counts {
+    fn none(recording: &Recording) -> Self {
+        Counts {
+            rows: 0,
+            samples: 0,
+            dropped: 0,
+            drops: vec![0; recording.layout.columns.len()],
+            worst: vec![(0.0, 0); recording.layout.followers.len()],
+            ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); recording.fixed.len()],
+            time: None,
+            steps: Steps::new(),
+            longest: (0.0, 0),
+        }
+    }
+
+    fn take(&mut self, parsed: &Parsed) {
+        self.rows += parsed.rows_read;
+        self.drops.iter_mut().zip(&parsed.drops).for_each(|(sum, own)| *sum += own);
+        for (worst, own) in self.worst.iter_mut().zip(&parsed.worst) {
+            if own.0 > worst.0 {
+                *worst = *own;
             }
         }
-        for (t, line) in times.iter().flatten().copied().zip(lines.iter().copied()) {
-            let (first, last) = time.unwrap_or((t, t));
-            if t > last {
-                steps.take(t - last);
-                if t - last > longest.0 {
-                    longest = (t - last, line);
+        for Chunk { len, lines, time, commands, dropped, .. } in &parsed.chunks {
+            self.samples += *len as u64;
+            self.dropped += dropped;
+            for row in commands.chunks_exact(self.ranges.len()) {
+                for (range, value) in self.ranges.iter_mut().zip(row) {
+                    *range = (range.0.min(*value), range.1.max(*value));
                 }
             }
-            time = Some((first, t));
+            for (t, line) in time.iter().flatten().copied().zip(lines.iter().copied()) {
+                let (first, last) = self.time.unwrap_or((t, t));
+                if t > last {
+                    self.steps.take(t - last);
+                    if t - last > self.longest.0 {
+                        self.longest = (t - last, line);
+                    }
+                }
+                self.time = Some((first, t));
+            }
         }
-        take(chunk);
     }
-    let pass = chunks.pass;
-    if pass.rows == 0 {
+}
+
+/// Every chunk goes to `keeping`, while those behind it are read.
+pub(super) fn scan(recording: &Recording, keeping: &mut Keeping) -> Result<Summary> {
+    let mut counts = Counts::none(recording);
+    let mut reading = Reading::start(recording, false)?;
+    let mut present = reading.batch();
+    while !present.is_empty() {
+        let take = || {
+            present.into_iter().try_for_each(|parsed| {
+                let parsed = parsed?;
+                counts.take(&parsed);
+                parsed.chunks.into_iter().try_for_each(|chunk| keeping.take(chunk))
+            })
+        };
+        let (next, taken) = rayon::join(|| reading.batch(), take);
+        taken?;
+        present = next;
+    }
+    let Counts { rows, samples, dropped, drops, worst, ranges, time, steps, longest } = counts;
+    if rows == 0 {
         return Err(recording.error(Fail::at(0, 0, Fault::NoRows)));
     }
     if samples == 0 {
         let (column, count) =
-            pass.drops.iter().enumerate().max_by_key(|(i, n)| (**n, usize::MAX - i)).unwrap_or((0, &0));
+            drops.iter().enumerate().max_by_key(|(i, n)| (**n, usize::MAX - i)).unwrap_or((0, &0));
         let column = recording.layout.columns[column].name.clone();
-        return Err(recording.error(Fail::at(
-            0,
-            0,
-            Fault::AllDropped { rows: pass.rows, column, count: *count },
-        )));
+        return Err(recording.error(Fail::at(0, 0, Fault::AllDropped { rows, column, count: *count })));
     }
     let mut warnings = recording.warnings.clone();
-    warn_of_couplings(recording, &pass.worst, &mut warnings);
+    warn_of_couplings(recording, &worst, &mut warnings);
     warn_of_travel(recording, &ranges, &mut warnings);
     let moving: Vec<bool> = ranges.iter().map(|(from, to)| to - from > STANDSTILL).collect();
     if !moving.contains(&true) {
@@ -146,7 +191,7 @@ pub(super) fn scan(recording: &Recording, mut take: impl FnMut(Chunk)) -> Result
         warn_of_jump(longest, time, &mut warnings);
     }
     Ok(Summary {
-        rows: pass.rows,
+        rows,
         samples,
         dropped,
         commands: ranges,
