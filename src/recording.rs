@@ -19,6 +19,7 @@
 
 mod arrays;
 mod call;
+mod chunk;
 mod column;
 mod decimal;
 mod entry;
@@ -30,6 +31,7 @@ mod lines;
 mod pieces;
 mod reader;
 mod rows;
+mod scan;
 mod spool;
 mod step;
 mod summary;
@@ -37,7 +39,8 @@ mod text;
 
 inner! {
     use column::{Column, Role};
-    use reader::{Block, Chunk, Chunks, Row, Rows};
+    use chunk::Chunk;
+    use reader::{Block, Chunks, Row, Rows};
     use summary::Summary;
 }
 pub use arrays::Arrays;
@@ -302,7 +305,7 @@ impl Recording {
             return Ok(kept.summary.clone());
         }
         let mut keeping = Keeping::new(self);
-        let summary = summary::scan(self, &mut keeping)?;
+        let summary = scan::scan(self, &mut keeping)?;
         let kept = keeping.with(summary)?;
         Ok(self.kept.get_or_init(|| kept).summary.clone())
     }

@@ -1,10 +1,12 @@
 //! Recordings as the identification sees them: passes over chunks of samples on all cores.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::Approach;
+use super::replay::Replay;
 use super::stretch::{Beginning, Memories, Stretch, stretches};
 use crate::error::Result;
 use crate::feature::{Feature, gravity_of};
@@ -138,6 +140,8 @@ pub(crate) struct Sources<'a> {
     pub lengths: Vec<usize>,
     machine: &'a Machine,
     varying: &'a Varying,
+    /// What passes have brought elsewhere, where the samples are not here.
+    pub replay: Option<Arc<Replay>>,
     /// Motion against the direction of travel that counts as a reversal beyond this, by command, m or rad.
     pub dead_bands: Vec<f64>,
 }
@@ -162,6 +166,34 @@ impl<'a> Sources<'a> {
         dead_bands: &[Option<f64>],
         progress: &dyn Fn(&str),
     ) -> Result<Self> {
+        let mut summaries = Vec::with_capacity(recordings.len());
+        for recording in recordings {
+            progress(&format!("reading {}", recording.name()));
+            summaries.push(recording.scan()?);
+        }
+        let mut sources = Sources::of(recordings, summaries, machine, varying, dead_bands);
+        if !varying.is_constant() {
+            for source in &mut sources.all {
+                let beginning = Beginning::of(source.recording, machine, varying, &sources.dead_bands)?;
+                source.beginning = Some(beginning);
+            }
+        }
+        let in_memory = |s: &Source| s.recording.stored().is_some_and(|stored| stored.is_in_memory());
+        let is_small = sources.samples() <= CACHED_SAMPLES && sources.all.iter().all(in_memory);
+        if !varying.is_constant() && is_small {
+            sources.cache()?;
+        }
+        Ok(sources)
+    }
+
+    /// Recordings of which it is known what they hold; none is read.
+    pub fn of(
+        recordings: &'a [Recording],
+        summaries: Vec<Summary>,
+        machine: &'a Machine,
+        varying: &'a Varying,
+        dead_bands: &[Option<f64>],
+    ) -> Self {
         let commands = machine.commands().len();
         let mut sources = Sources {
             all: Vec::new(),
@@ -173,13 +205,10 @@ impl<'a> Sources<'a> {
             lengths: Vec::new(),
             machine,
             varying,
+            replay: None,
             dead_bands: Vec::new(),
         };
-        let mut samples = 0;
-        for recording in recordings {
-            progress(&format!("reading {}", recording.name()));
-            let summary = recording.scan()?;
-            samples += summary.samples;
+        for (recording, summary) in recordings.iter().zip(summaries) {
             let namesakes = recordings.iter().filter(|r| r.name() == recording.name()).count();
             sources.add(recording, label(recording, namesakes > 1), summary, machine);
         }
@@ -192,17 +221,7 @@ impl<'a> Sources<'a> {
                 given.unwrap_or(DEAD_BAND * (high - low).max(0.0))
             })
             .collect();
-        if !varying.is_constant() {
-            for source in &mut sources.all {
-                let beginning = Beginning::of(source.recording, machine, varying, &sources.dead_bands)?;
-                source.beginning = Some(beginning);
-            }
-        }
-        let in_memory = |s: &Source| s.recording.stored().is_some_and(|stored| stored.is_in_memory());
-        if !varying.is_constant() && samples <= CACHED_SAMPLES && sources.all.iter().all(in_memory) {
-            sources.cache()?;
-        }
-        Ok(sources)
+        sources
     }
 
     /// Keeps all samples with their features in memory.

@@ -22,6 +22,14 @@ pub(crate) struct Thin {
 
 /// Evenly spread samples of every recording.
 pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
+    if let Some(replay) = &sources.replay {
+        let of = |(source, own): (usize, &Vec<(Vec<f64>, Vec<f64>)>)| {
+            let thin =
+                |(q, values): &(Vec<f64>, Vec<f64>)| Thin { source, q: q.clone(), values: values.clone() };
+            own.iter().map(thin).collect::<Vec<_>>()
+        };
+        return Ok(replay.thin.iter().enumerate().flat_map(of).collect());
+    }
     let commands = machine.commands().len();
     let mut seen = vec![0u64; sources.all.len()];
     let mut all = Vec::new();

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use super::Recording;
-use super::reader::Chunk;
+use super::chunk::Chunk;
 use super::spool::{Shape, Spool, SpoolWriter};
 use super::summary::Summary;
 use crate::error::Result;

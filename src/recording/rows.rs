@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use super::Recording;
 use super::RecordingFault as Fault;
+use super::chunk::Chunk;
 use super::column::{Column, Layout, Role};
 use super::decimal;
 use super::header::{Measurement, known_key};
 use super::lines::LONGEST;
-use super::reader::Chunk;
 use super::text::{self, Fail, LARGEST, LARGEST_OTHER};
 
 /// Most samples that a chunk holds.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Recording;
-use super::reader::Chunk;
+use super::chunk::Chunk;
 use crate::error::{Error, Place, Result};
 
 /// Which columns chunks of a recording have.
