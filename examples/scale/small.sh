@@ -9,9 +9,10 @@ cd "$work"
 for machine in scara ac_table_tilting; do
     mkdir -p "raw" "fleet/$machine"
     kincal machines "$machine" >"fleet/$machine/machine.ron"
-    for day in 1 2; do
-        kincal simulate "fleet/$machine/machine.ron" --test poses --random 60 --seed "$day" -o "raw/${machine}_$day.csv" --quiet
-    done
+    # Two tests of one machine, whose deviations the seed draws.
+    simulate() { kincal simulate "fleet/$machine/machine.ron" --test poses --random 1 --noise 2um "$@" --quiet; }
+    simulate --count 60 --measure position -o "raw/${machine}_1.csv"
+    simulate --count 80 --measure pose -o "raw/${machine}_2.csv"
     python "$here/lake.py" put lake raw/"$machine"_*.csv
     python "$here/lake.py" get lake "$machine" "fleet/$machine"
 done

@@ -15,7 +15,7 @@ use super::output::{Failure, Outcome, write_whole};
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// What `kincal normal` has written, all of one round
-    #[arg(required = true, value_name = "PART")]
+    #[arg(required = true, value_name = "PART.ron")]
     parts: Vec<PathBuf>,
     /// Where to write the calibrated machine, or the round that is still needed
     #[arg(short, long, value_name = "MODEL.ron")]
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
             })?;
             let (number, path) = (round.number(), args.output.display());
             args.common.say(&format!(
-                "round {number} is needed, written to {path}; next, for each part: kincal normal MACHINE.ron REC.csv... --at {path} -o PART\n"
+                "round {number} is needed, written to {path}; next, for each part: kincal normal MACHINE.ron REC.csv... --at {path} -o PART.ron\n"
             ))?;
             args.common.write_json(&Told { converged: false, round: Some(number), fit: None })
         }

@@ -24,7 +24,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "ROUND.ron")]
     at: Option<PathBuf>,
     /// Where to write what these recordings add
-    #[arg(short, long, value_name = "PART")]
+    #[arg(short, long, value_name = "PART.ron")]
     output: Output,
     /// Refused: directions of travel go across recordings
     #[arg(long, value_name = "AXES", hide = true)]
@@ -67,7 +67,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         n => format!("sums of {of}, round {n}"),
     };
     args.common.say(&format!(
-        "{text}\nwritten to {}; next: kincal merge PART... -o ROUND.ron\n",
+        "{text}\nwritten to {}; next: kincal merge PART.ron... -o ROUND.ron\n",
         args.output.display()
     ))?;
     args.common.write_json(&Told { rounds: part.rounds(), recordings: part.recordings() })

@@ -27,7 +27,7 @@ const TABLE: [Row; 20] = [
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--report", "--json"]),
     row("normal", &[], &["MACHINE.ron", "REC.csv", "--at"], &["--output", "--json"]),
-    row("merge", &[], &["PART"], &["--output", "--json"]),
+    row("merge", &[], &["PART.ron"], &["--output", "--json"]),
     row("compare", &[], &["MACHINE.ron", "REC.csv", "--judge", "--truth"], &["--json"]),
     row("predict", &[], &["CALIBRATED.ron", "REC.csv", "BESIDE.csv"], &["--output", "--json"]),
     row("join", &["--as", "n"], &["REC.csv", "OTHER.csv"], &["--output", "--json"]),

@@ -55,7 +55,7 @@ fn samples_beyond_memory_go_to_a_file_of_which_nothing_is_left() {
     let folder = Folder::new("spool");
     let rec = folder.0.join("rec.csv");
     let made = command()
-        .args(["simulate", "machines/scara.ron", "--test", "poses", "--random", "200", "--seed", "3", "-o"])
+        .args(["simulate", "machines/scara.ron", "--test", "poses", "--random", "1", "--count", "200", "-o"])
         .arg(&rec)
         .output()
         .expect("it runs");
