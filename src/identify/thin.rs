@@ -2,6 +2,7 @@
 
 use super::evaluator::{Evaluator, Moment};
 use super::noise::Noise;
+use super::replay::Few;
 use super::source::Sources;
 use super::unknowns::Unknowns;
 use crate::error::Result;
@@ -23,10 +24,9 @@ pub(crate) struct Thin {
 /// Evenly spread samples of every recording.
 pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
     if let Some(replay) = &sources.replay {
-        let of = |(source, own): (usize, &Vec<(Vec<f64>, Vec<f64>)>)| {
-            let thin =
-                |(q, values): &(Vec<f64>, Vec<f64>)| Thin { source, q: q.clone(), values: values.clone() };
-            own.iter().map(thin).collect::<Vec<_>>()
+        let of = |(source, own): (usize, &Few)| {
+            let thin = own.iter().cloned().map(|(q, values)| Thin { source, q, values });
+            thin.collect::<Vec<_>>()
         };
         return Ok(replay.thin.iter().enumerate().flat_map(of).collect());
     }

@@ -43,7 +43,7 @@ pub(super) fn push(text: &mut Vec<u8>, value: f64, decimals: usize) {
         return;
     };
     // All digits with zeros before them, from the right, in halves that are worked on side by side.
-    let mut written = [[b'0'; 2]; (MOST + 1) / 2];
+    let mut written = [[b'0'; 2]; MOST.div_ceil(2)];
     let (upper, lower) = ((digits / 100_000_000) as u32, (digits % 100_000_000) as u32);
     for (half, mut rest) in written.chunks_exact_mut(4).zip([upper, lower]) {
         for pair in half.iter_mut().rev() {

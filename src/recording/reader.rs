@@ -16,14 +16,14 @@ use crate::error::{Error, Result};
 pub struct Chunks<'a>(Origin<'a>);
 
 enum Origin<'a> {
-    Kept(std::iter::Map<std::ops::Range<usize>, Box<dyn Fn(usize) -> Result<Arc<Chunk>> + Send + 'a>>),
+    Kept { stored: &'a Stored, next: usize },
     File { reading: Box<Reading<'a>>, ready: std::vec::IntoIter<Chunk> },
 }
 
 impl<'a> Chunks<'a> {
     pub(super) fn kept(kept: &'a Kept) -> Self {
         let stored: &'a Stored = &kept.stored;
-        Chunks(Origin::Kept((0..stored.len()).map(Box::new(|i| stored.chunk(i)))))
+        Chunks(Origin::Kept { stored, next: 0 })
     }
 
     pub(super) fn of(reading: Reading<'a>) -> Self {
@@ -33,7 +33,10 @@ impl<'a> Chunks<'a> {
     /// The next chunk; what is in memory is not copied.
     pub(super) fn shared(&mut self) -> Option<Result<Arc<Chunk>>> {
         match &mut self.0 {
-            Origin::Kept(chunks) => chunks.next(),
+            Origin::Kept { stored, next } => {
+                let i = std::mem::replace(next, *next + 1);
+                (i < stored.len()).then(|| stored.chunk(i))
+            }
             Origin::File { reading, ready } => loop {
                 if let Some(chunk) = ready.next() {
                     return Some(Ok(Arc::new(chunk)));
@@ -340,7 +343,7 @@ mod tests {
                     let rows = with_threads(threads, || {
                         recording
                             .rows_with_text()
-                            .and_then(|rows| rows.map(|rows| rows.map(drop)).collect::<Result<()>>())
+                            .and_then(|mut rows| rows.try_for_each(|rows| rows.map(drop)))
                     });
                     assert_eq!(rows.expect_err(fault).to_string(), error);
                 }
