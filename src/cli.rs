@@ -15,10 +15,13 @@ mod failure;
 mod files;
 mod import;
 mod join;
+mod keep;
 mod location;
 mod machines;
 mod man;
+mod merge;
 mod new;
+mod normal;
 mod output;
 mod part;
 mod predict;
@@ -53,6 +56,10 @@ enum Command {
     Check(check::Args),
     /// Identifies the deviations of a machine from recordings
     Calibrate(calibrate::Args),
+    /// Partial normal equations: what recordings add to a calibration, without the recordings
+    Normal(normal::Args),
+    /// The calibrated machine from partial normal equations, or the round that is still needed
+    Merge(merge::Args),
     /// Other ways to identify, fitted to the same recordings and judged side by side
     Compare(compare::Args),
     /// What a calibrated machine says the instrument would read, sample by sample
@@ -132,6 +139,8 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Describe(args) => describe::run(args),
         Command::Check(args) => check::run(args),
         Command::Calibrate(args) => calibrate::run(args),
+        Command::Normal(args) => normal::run(args),
+        Command::Merge(args) => merge::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Predict(args) => predict::run(args),
         Command::Join(args) => join::run(args),

@@ -18,8 +18,11 @@ mod noise;
 mod normal;
 mod optimum;
 mod options;
+mod part;
+mod partial;
 mod places;
 mod plausible;
+mod replay;
 mod set_up_values;
 mod settle;
 mod solve;
@@ -46,6 +49,7 @@ pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
 pub(crate) use optimum::{optimum, sources};
 pub use options::{Approach, CalibrateOptions, ErrorModel};
+pub use partial::{Merged, Part, Round, merge};
 pub(crate) use places::Places;
 pub(crate) use plausible::by_commands;
 pub use plausible::{Plausibility, as_declared, worst};
@@ -121,6 +125,19 @@ fn attempt(
     let varying = &model.varying;
     let mut sources = Sources::new(recordings, machine, varying, &model.dead_bands, progress)?;
     sources.approach(&model.approaches)?;
+    identify(machine, sources, model, options, frames, progress)
+}
+
+/// From sources to the machine.
+fn identify(
+    machine: &Machine,
+    mut sources: Sources,
+    model: &ErrorModel,
+    options: CalibrateOptions,
+    frames: Option<&[Pose<f64>]>,
+    progress: &dyn Fn(&str),
+) -> Result<((CalibratedMachine, Fit), Frames)> {
+    let varying = &model.varying;
     if let Some(count) = model.samples {
         let directions = varying.directions.as_ref();
         sources.pick(count, directions.map_or(1, |d| d.piece_count()), |stretch, k| {

@@ -142,28 +142,50 @@ fn predicted(
     }
     let judge = Judge { calibrated, evaluator: &evaluator, table };
     let mut sums = Sums::none(machine.commands().len(), evaluator.piece_count());
-    let mut rows = recording.rows_with_text()?;
-    let mut group = next_group(&mut rows, path.as_mut())?;
-    while !group.is_empty() {
-        let judged = || group.into_par_iter().map(|item| judge.block(item)).collect::<Vec<_>>();
-        // A model that depends on the path goes along it on this thread; else the next rows are read beside.
-        let (next, judged) = match &mut path {
-            None => rayon::join(|| next_group(&mut rows, None), judged),
-            Some(path) => {
-                let judged = judged();
-                (next_group(&mut rows, Some(path)), judged)
-            }
-        };
+    let mut tell = |judged: Vec<Judged>| -> Result<()> {
         for Judged { sums: own, text, residuals } in judged {
             sums.add(&own);
             if let Some(each) = &mut each {
                 residuals.chunks_exact(sensor.reading_count()).for_each(&mut **each);
             }
             if let Some(out) = &mut out {
-                out.write_all(text.as_bytes()).map_err(failed)?;
+                out.write_all(&text).map_err(failed)?;
             }
         }
-        group = next?;
+        Ok(())
+    };
+    let judged = |group: Vec<Item>| group.into_par_iter().map(|item| judge.block(item)).collect::<Vec<_>>();
+    let mut rows = recording.rows_with_text()?;
+    if let Some(path) = &mut path {
+        // A model that depends on the path goes along it on this thread.
+        loop {
+            let group = next_group(&mut rows, Some(path))?;
+            if group.is_empty() {
+                break;
+            }
+            tell(judged(group))?;
+        }
+    } else {
+        // Rows are read beside those that are judged, and those before are written meanwhile.
+        let (mut group, mut told) = (next_group(&mut rows, None)?, Vec::new());
+        while !(group.is_empty() && told.is_empty()) {
+            let (present, mut next) = (std::mem::take(&mut group), (Ok(Vec::new()), Vec::new()));
+            let written = rayon::in_place_scope(|scope| {
+                if !present.is_empty() {
+                    scope.spawn(|_| next = rayon::join(|| next_group(&mut rows, None), || judged(present)));
+                }
+                tell(std::mem::take(&mut told))
+            });
+            written?;
+            told = next.1;
+            match next.0 {
+                Ok(next) => group = next,
+                Err(error) => {
+                    tell(told)?;
+                    return Err(error);
+                }
+            }
+        }
     }
     let Sums { sizes, dropped, extrapolated, farthest, pieces } = sums;
     let unseen = || pieces.iter().enumerate().filter(|(piece, n)| **n > 0 && !variation.has_seen(*piece));
@@ -236,7 +258,7 @@ impl Sums {
 /// What is told of a block of rows: its sums, its rows as they are to be written, its residuals.
 struct Judged {
     sums: Sums,
-    text: String,
+    text: Vec<u8>,
     residuals: Vec<f64>,
 }
 
@@ -282,7 +304,8 @@ impl Judge<'_> {
                 _ => sums.sizes.m.take(residual),
             }
         }
-        let mut text = String::new();
+        let room = |table: &Table| block.rows().map(|row| row.text.len() + table.width()).sum();
+        let mut text = Vec::with_capacity(table.as_ref().map_or(0, room));
         for row in table.iter().flat_map(|table| block.rows().map(move |row| (table, row))) {
             match row {
                 (table, Row { text: row, sample: None, .. }) => table.push_dropped(row, &mut text),

@@ -8,30 +8,39 @@
 //! 0.0000,0.0000,-44.0232,41.0652,75.0000,0.0000,-0.0159
 //! ```
 //!
-//! [`Recording::open`] reads header and column names and settles what every column is for; no row is held. Every pass
-//! ([`Recording::chunks`], [`Recording::rows_with_text`], [`Recording::scan`]) reads the file line by line, in memory that does not grow
-//! with the file; the samples of recordings that are not too large are kept by the first full pass for those after it. Units are converted at this border: everything that comes out is m, rad, s, K.
+//! [`Recording::open`] reads header and column names and settles what every column is for; no row is held. A pass
+//! ([`Recording::chunks`], [`Recording::rows_with_text`], [`Recording::scan`]) reads the file in pieces that end where lines end, on all
+//! cores, in memory that does not grow with the file; whatever the number of cores, the same samples come in the same chunks, and the same
+//! fault is told. The first scan keeps the samples for later passes, in memory within [`Memory`] and beyond it in a file of numbers. Units
+//! are converted at this border: everything that comes out is m, rad, s, K.
 //!
 //! A row is a *drop-out*, left out and counted, where a command, the time, a direction or a measured number is empty or NaN.
 //! A *pause* is a time between two samples longer than five times the median one; derivatives start again after it.
 
 mod arrays;
 mod call;
+mod chunk;
 mod column;
+mod decimal;
 mod entry;
 mod fault;
 mod header;
 mod join;
 mod kept;
 mod lines;
+mod pieces;
 mod reader;
+mod rows;
+mod scan;
+mod spool;
 mod step;
 mod summary;
 mod text;
 
 inner! {
     use column::{Column, Role};
-    use reader::{Block, Chunk, Chunks, Row, Rows};
+    use chunk::Chunk;
+    use reader::{Block, Chunks, Row, Rows};
     use summary::Summary;
 }
 pub use arrays::Arrays;
@@ -40,8 +49,10 @@ pub use column::Channel;
 pub use fault::RecordingFault;
 pub use header::{Header, Measurement, NominalLength, Sigma, ToolPoint};
 pub use join::{Joined, join};
+pub use kept::Memory;
 pub(crate) use step::step_of;
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -51,9 +62,9 @@ use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
 use column::Layout;
 use header::Draft;
-use kept::{Keeping, Kept};
+use kept::{Keeping, Kept, Stored};
 use lines::{LONGEST, Lines, Stop};
-use reader::Pass;
+use reader::Reading;
 use text::Fail;
 
 /// Most that may stand before the data, bytes.
@@ -96,6 +107,7 @@ pub struct Recording {
     preamble: String,
     /// Number of the header row and the byte behind it.
     data_from: (u64, u64),
+    memory: Memory,
     /// What the first full pass has brought.
     kept: Arc<OnceLock<Kept>>,
 }
@@ -166,8 +178,16 @@ impl Recording {
             warnings,
             preamble,
             data_from,
+            memory: Memory::default(),
             kept,
         })
+    }
+
+    /// The same, what is kept of it being within `memory`; what has been kept already stays where it is.
+    #[must_use]
+    pub fn within(mut self, memory: &Memory) -> Recording {
+        self.memory = memory.clone();
+        self
     }
 
     /// What the recording says of itself.
@@ -220,15 +240,15 @@ impl Recording {
         &self.warnings
     }
 
-    /// The samples in chunks of at most 4096, from memory where [`Recording::scan`] has kept them, else read anew from the file; after an
-    /// error nothing more comes.
+    /// The samples in chunks of at most 4096, as [`Recording::scan`] has kept them, else read anew from the file; after an error nothing
+    /// more comes.
     ///
     /// # Errors
     /// [`Error::File`] here; each chunk may bring [`Error::Input`] with line and column.
     pub fn chunks(&self) -> Result<Chunks<'_>> {
-        match self.kept.get().and_then(Kept::chunks) {
-            Some(chunks) => Ok(Chunks::kept(chunks)),
-            None => Ok(Pass::start(self)?.chunks()),
+        match self.kept.get() {
+            Some(kept) => Ok(Chunks::kept(kept)),
+            None => Ok(Chunks::of(Reading::start(self, false)?)),
         }
     }
 
@@ -236,11 +256,36 @@ impl Recording {
     ///
     /// # Errors
     /// As [`Recording::chunks`].
-    pub(crate) fn shared_chunks(&self) -> Result<Box<dyn Iterator<Item = Result<Arc<Chunk>>> + '_>> {
-        match self.kept.get().and_then(Kept::chunks) {
-            Some(chunks) => Ok(Box::new(chunks.iter().cloned().map(Ok))),
-            None => Ok(Box::new(Pass::start(self)?.chunks().map(|chunk| chunk.map(Arc::new)))),
-        }
+    pub(crate) fn shared_chunks(&self) -> Result<impl Iterator<Item = Result<Arc<Chunk>>> + '_> {
+        let mut chunks = self.chunks()?;
+        Ok(std::iter::from_fn(move || chunks.shared()))
+    }
+
+    /// The chunks that hold samples of these numbers, from 0, each with the number of its first.
+    ///
+    /// # Errors
+    /// As [`Recording::scan`].
+    pub(crate) fn chunks_with<'a>(
+        &'a self,
+        numbers: &'a BTreeSet<u64>,
+    ) -> Result<impl Iterator<Item = Result<(u64, Arc<Chunk>)>> + 'a> {
+        self.scan()?;
+        let mut first = 0;
+        Ok(self
+            .stored()
+            .into_iter()
+            .flat_map(|stored| (0..stored.len()).map(move |i| (stored, i)))
+            .filter_map(move |(stored, i)| {
+                let from = first;
+                first += stored.samples(i) as u64;
+                numbers.range(from..first).next()?;
+                Some(stored.chunk(i).map(|chunk| (from, chunk)))
+            }))
+    }
+
+    /// What [`Recording::scan`] has kept, to be had in any order.
+    pub(crate) fn stored(&self) -> Option<&Stored> {
+        self.kept.get().map(|kept| &kept.stored)
     }
 
     /// The rows as written together with their samples, in blocks of at most 4096 rows; drop-outs are among the rows.
@@ -248,35 +293,25 @@ impl Recording {
     /// # Errors
     /// As [`Recording::chunks`].
     pub fn rows_with_text(&self) -> Result<Rows<'_>> {
-        Ok(Pass::start(self)?.with_text())
+        Ok(Rows::of(Reading::start(self, true)?))
     }
 
-    /// Reads all rows once: checks them, counts, takes ranges. Later passes over a recording that is not too large are over what this one
-    /// keeps in memory, as is a second scan.
+    /// Reads all rows once: checks them, counts, takes ranges. Later passes are over what this one keeps, as is a second scan.
     ///
     /// # Errors
-    /// The first fault in a row; [`RecordingFault::NoRows`] or [`RecordingFault::AllDropped`] where no sample is left.
+    /// A file of numbers that cannot be written, where [`Memory`] has no room; the first fault in a row; [`RecordingFault::NoRows`] or [`RecordingFault::AllDropped`] where no sample is left.
     pub fn scan(&self) -> Result<Summary> {
         if let Some(kept) = self.kept.get() {
             return Ok(kept.summary.clone());
         }
-        let mut keeping = Keeping::default();
-        let summary = summary::scan(self, |chunk| keeping.take(chunk))?;
-        Ok(self.kept.get_or_init(|| keeping.with(summary)).summary.clone())
-    }
-
-    /// Lines behind the header row.
-    fn data_lines(&self) -> Result<Lines> {
-        let (number, offset) = self.data_from;
-        Ok(Lines::new(self.source.read_from(&self.path, offset)?, number, offset))
+        let mut keeping = Keeping::new(self);
+        let summary = scan::scan(self, &mut keeping)?;
+        let kept = keeping.with(summary)?;
+        Ok(self.kept.get_or_init(|| kept).summary.clone())
     }
 
     fn error(&self, fail: Fail) -> Error {
         error(&self.path, fail)
-    }
-
-    fn stopped(&self, stop: Stop, line: u64) -> Error {
-        stopped(&self.path, stop, line)
     }
 }
 

@@ -16,6 +16,7 @@ use clap::ValueEnum;
 
 use super::Common;
 use super::files::Output;
+use super::keep::Keep;
 use super::output::{
     Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, table, write_whole,
 };
@@ -98,6 +99,8 @@ pub(crate) struct Args {
     /// Go on although recordings and machine do not belong together
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    keep: Keep,
     #[command(flatten)]
     common: Common,
 }
@@ -200,7 +203,7 @@ pub(crate) fn judged(
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
+    let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
     let progress = args.common.progress();
     let model = args.model(&machine)?;
     let (calibrated, fit, note) =

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::Common;
 use super::calibrate::{positive, relative};
+use super::keep::Keep;
 use super::output::{Failure, Outcome, angle, count, length, open_machine, open_recordings, table};
 use super::verdict;
 
@@ -48,6 +49,8 @@ pub(crate) struct Args {
     #[arg(long)]
     force: bool,
     #[command(flatten)]
+    keep: Keep,
+    #[command(flatten)]
     common: Common,
 }
 
@@ -66,7 +69,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let tuning = Tuning { tau: args.tau, cut: args.cut, steps: args.steps as usize };
     let rivals = chosen(&args.rivals, tuning)?;
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let open = |paths: &[PathBuf]| open_recordings(paths, &machine, &args.machine);
+    let open = |paths: &[PathBuf]| {
+        Ok::<_, Failure>(args.keep.within(open_recordings(paths, &machine, &args.machine)?))
+    };
     let (mut fit_on, mut judge_on) = (open(&args.recordings)?, open(&args.judge)?);
     let truth = match &args.truth {
         None => None,

@@ -13,6 +13,7 @@ use crate::units::{Quantity, amount};
 use serde_json::{Value, json};
 
 use super::Common;
+use super::keep::Keep;
 use super::output::{
     Failure, Kind, Outcome, Shown, angle, count, decimals, length, open_machine, open_recordings, table,
 };
@@ -31,6 +32,8 @@ pub(crate) struct Args {
     /// List every combination that a measurement does not see
     #[arg(long)]
     unseen: bool,
+    #[command(flatten)]
+    keep: Keep,
     #[command(flatten)]
     common: Common,
 }
@@ -51,7 +54,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     if !args.recordings.is_empty() {
         let machine = calibrated.machine();
-        let recordings = open_recordings(&args.recordings, machine, &args.machine)?;
+        let recordings = args.keep.within(open_recordings(&args.recordings, machine, &args.machine)?);
         let reach = reach(machine, &recordings)?;
         let _ = writeln!(
             text,

@@ -15,6 +15,7 @@ use crate::units::Quantity;
 
 use super::Common;
 use super::files::Output;
+use super::keep::Keep;
 use super::output::{Outcome, angle, length, open_machine, open_recordings, write_whole};
 use super::report::{Frame, Measured, Source, of_diagnosis, of_measured, render, write_page};
 use super::verdict;
@@ -45,6 +46,8 @@ pub(crate) struct Args {
     /// Go on although recordings and machine do not belong together
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    keep: Keep,
     #[command(flatten)]
     common: Common,
 }
@@ -79,7 +82,7 @@ pub(crate) fn judged(
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let recordings = open_recordings(&args.recordings, &machine, &args.machine)?;
+    let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
     let mut library = Library::standard();
     for path in &args.effects {
         library = library.with_file(path)?;

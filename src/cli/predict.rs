@@ -9,6 +9,7 @@ use crate::predict::{Beyond, Prediction, predict};
 
 use super::Common;
 use super::files::Output;
+use super::keep::Keep;
 use super::output::{Failure, Kind, Outcome, count, open_machine, open_recordings, write_checked};
 
 #[derive(clap::Args)]
@@ -29,13 +30,15 @@ pub(crate) struct Args {
     #[arg(long)]
     fit_setup: bool,
     #[command(flatten)]
+    keep: Keep,
+    #[command(flatten)]
     common: Common,
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let files: Vec<PathBuf> = std::iter::once(&args.recording).chain(&args.beside).cloned().collect();
     let mut calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
-    let recordings = open_recordings(&files, calibrated.machine(), &args.machine)?;
+    let recordings = args.keep.within(open_recordings(&files, calibrated.machine(), &args.machine)?);
     if recordings.len() > 1 {
         return Err(Failure::Told {
             what: format!(

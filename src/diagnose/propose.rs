@@ -90,10 +90,7 @@ pub(super) fn proposals(
             parts.iter().cloned().partition(|part| dyad(part) == Some(place));
         let others = [known, &others].concat();
         let law = law(search, &laws, place, &others, &free);
-        let (terms, library_of_terms) = match &law {
-            Some(law) => (law.as_slice(), &laws),
-            None => (free.as_slice(), unnamed),
-        };
+        let terms = law.as_deref().unwrap_or(&free);
         let mut looks_like: Vec<LikelyName> = Vec::new();
         for name in free.iter().flat_map(names) {
             let is_new = looks_like.iter().all(|other| other.effect != name.effect);
@@ -102,7 +99,8 @@ pub(super) fn proposals(
             }
         }
         let name = format!("proposed_{}", all.len() + 1);
-        let draft = Draft { search, terms, library: library_of_terms, machine };
+        let libraries = [(laws.first, &laws.library), (unnamed.first, &unnamed.library), (0, library)];
+        let draft = Draft { search, terms, libraries, machine };
         let held_out = |terms: &[ModelTerm]| held_out(search, &others, terms);
         all.extend(draft.family(&others, &name, &looks_like).map(|ron| Proposal {
             name,
@@ -172,13 +170,19 @@ fn law(
 struct Draft<'a> {
     search: &'a Search<'a>,
     terms: &'a [ModelTerm],
-    library: &'a Unnamed,
+    /// Whose families the candidates are of, each with its first candidate; the last ones first.
+    libraries: [(usize, &'a Library); 3],
     machine: &'a Machine,
 }
 
 impl Draft<'_> {
+    fn library_of(&self, term: &ModelTerm) -> &Library {
+        let of = self.libraries.iter().find(|(first, _)| term.candidate >= *first);
+        of.map_or(self.libraries[2].1, |(_, library)| library)
+    }
+
     fn family_of(&self, term: &ModelTerm) -> &Family {
-        &self.library.library.families()[self.search.candidates[term.candidate].family]
+        &self.library_of(term).families()[self.search.candidates[term.candidate].family]
     }
 
     /// The other joint.
@@ -209,7 +213,7 @@ impl Draft<'_> {
         for (i, term) in self.terms.iter().enumerate() {
             let candidate = &self.search.candidates[term.candidate];
             let solved = model.effect(self.search, &all, others.len() + i, 0.0);
-            let found = solved.identified(candidate, &self.library.library, term.score.parameters.clone());
+            let found = solved.identified(candidate, self.library_of(term), term.score.parameters.clone());
             for (coefficient, value) in candidate.coefficients.iter().zip(&found.coefficients) {
                 let Some(part) = coefficient.parts.first() else { continue };
                 let column = candidate.features[part.feature].over(samples, &term.score.parameters);

@@ -466,6 +466,10 @@ fn in_words(problem: &Problem, vector: &DVector<f64>) -> String {
 /// One more pass: how many samples lie further off than noise explains, and which samples are the worst.
 fn suspects(problem: &Problem, found: &Found) -> Result<(u64, Vec<Suspect>)> {
     let (machine, sources) = (problem.machine, problem.sources);
+    if sources.replay.is_some() {
+        // Single samples are not among what is merged.
+        return Ok((0, Vec::new()));
+    }
     let unknowns = &found.solution.unknowns;
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     let limits: Vec<f64> =

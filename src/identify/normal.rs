@@ -12,6 +12,7 @@ use super::evaluator::{Evaluator, Moment};
 use super::gauge::{EXTRAS, Gauge};
 use super::loss::Loss;
 use super::noise::Noise;
+use super::part::{Part, Piece};
 use super::source::{Source, Sources};
 use super::stretch::Stretch;
 use super::tally::{COUNTS, Tally};
@@ -19,7 +20,7 @@ use super::thin::Thin;
 use super::unknowns::{Layout, Role, Unknowns};
 use crate::chain::deviation_jacobian;
 use crate::check::random_command;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::error_motion::{Motions, eliminate};
 use crate::lie::{Twist, Vec3, Wrench};
 use crate::machine::Machine;
@@ -80,36 +81,6 @@ pub(crate) fn sigmas(source: &Source, machine: &Machine, noise: Noise) -> Vec<f6
     (0..source.sensor.reading_count()).map(|i| noise[source.quantity(machine, i)]).collect()
 }
 
-/// What one chunk adds, by piece of the model; local columns: six of each dyad, the extras, the terms, the error motions.
-struct Part {
-    pieces: Vec<Option<Piece>>,
-    loss: f64,
-    tally: Tally,
-}
-
-/// Normal equations of the samples of one pattern of directions.
-struct Piece {
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
-}
-
-impl Part {
-    fn add(&mut self, other: Part) {
-        for (own, other) in self.pieces.iter_mut().zip(other.pieces) {
-            match (own, other) {
-                (Some(own), Some(other)) => {
-                    own.matrix += other.matrix;
-                    own.gradient += other.gradient;
-                }
-                (own, Some(other)) => *own = Some(other),
-                (_, None) => {}
-            }
-        }
-        self.loss += other.loss;
-        self.tally.add(&other.tally);
-    }
-}
-
 /// One pass over all data.
 pub(crate) fn accumulate(
     machine: &Machine,
@@ -127,20 +98,30 @@ pub(crate) fn accumulate(
     let lanes: Vec<_> = (evaluators.iter().zip(&sources.all))
         .map(|(evaluator, source)| on_lanes(evaluator, layout, source, unknowns, motions))
         .collect();
-    let mut sums: Vec<Option<Part>> = sources.all.iter().map(|_| None).collect();
-    sources.pass(
-        |index, stretch| {
-            let sigmas = sigmas(&sources.all[index], machine, noise[index]);
-            match &lanes[index] {
-                Some(gauges) => part_on_lanes(&evaluators[index], gauges, stretch, &sigmas, loss),
-                None => part(&evaluators[index], &sources.all[index], stretch, &sigmas, loss, room),
+    let sums = match &sources.replay {
+        Some(replay) => {
+            let noise = noise.iter().map(|n| [n.m, n.rad]).collect();
+            let sums = replay.sums(unknowns.state(), noise, loss)?;
+            let sums: Vec<Option<Part>> = sums.into_iter().map(|form| form.map(Part::from)).collect();
+            let fits = (sums.iter().zip(&evaluators).zip(&lanes)).all(|((sum, evaluator), lanes)| {
+                let width = |at: usize| match lanes {
+                    Some(gauges) => gauges.get(at).map(|(_, basis)| basis.columns.len()),
+                    None => (at < evaluator.piece_count()).then(|| evaluator.width()),
+                };
+                let pieces = sum.iter().flat_map(|sum| &sum.pieces).enumerate();
+                let mut found = pieces.filter_map(|(at, piece)| Some((at, piece.as_ref()?)));
+                found.all(|(at, piece)| Some(piece.gradient.len()) == width(at))
+            });
+            if !fits {
+                return Err(Error::Undetermined {
+                    what: "the sums of a part are not over the unknowns of this machine".into(),
+                    mend: "make the parts anew, with the same kincal for all".into(),
+                });
             }
-        },
-        |index, part| match &mut sums[index] {
-            None => sums[index] = Some(part),
-            Some(sum) => sum.add(part),
-        },
-    )?;
+            sums
+        }
+        None => sums(machine, sources, &evaluators, &lanes, noise, loss, room)?,
+    };
     let mut normal = Normal::zero(layout, motions, sources.all.len());
     for (index, sum) in sums.into_iter().enumerate() {
         let Some(mut sum) = sum else { continue };
@@ -163,6 +144,50 @@ pub(crate) fn accumulate(
         normal.motions = rest.values;
     }
     Ok(normal)
+}
+
+/// What the samples of each recording add up to, over the columns of their bases.
+fn sums(
+    machine: &Machine,
+    sources: &Sources,
+    evaluators: &[Evaluator],
+    lanes: &[Option<Vec<(Gauge, Basis)>>],
+    noise: &[Noise],
+    loss: Loss,
+    room: Room,
+) -> Result<Vec<Option<Part>>> {
+    let mut sums: Vec<Option<Part>> = sources.all.iter().map(|_| None).collect();
+    sources.pass(
+        |index, stretch| {
+            let sigmas = sigmas(&sources.all[index], machine, noise[index]);
+            match &lanes[index] {
+                Some(gauges) => part_on_lanes(&evaluators[index], gauges, stretch, &sigmas, loss),
+                None => part(&evaluators[index], &sources.all[index], stretch, &sigmas, loss, room),
+            }
+        },
+        |index, part| match &mut sums[index] {
+            None => sums[index] = Some(part),
+            Some(sum) => sum.add(part),
+        },
+    )?;
+    Ok(sums)
+}
+
+/// What [`accumulate`] takes from the samples of each recording, with constant deviations and no room for error motions.
+pub(crate) fn sums_at(
+    machine: &Machine,
+    sources: &Sources,
+    layout: &Layout,
+    unknowns: &Unknowns,
+    noise: &[Noise],
+    loss: Loss,
+) -> Result<Vec<Option<Part>>> {
+    let motions = Motions::default();
+    let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
+    let lanes: Vec<_> = (evaluators.iter().zip(&sources.all))
+        .map(|(evaluator, source)| on_lanes(evaluator, layout, source, unknowns, &motions))
+        .collect();
+    sums(machine, sources, &evaluators, &lanes, noise, loss, Room { motions: &motions, values: &[] })
 }
 
 /// Error motions with their present values.

@@ -101,7 +101,32 @@ struct Sizes {
 
 /// Every recording of a problem under these unknowns.
 pub(super) fn plausibility(problem: &Problem, unknowns: &Unknowns) -> Result<Vec<Plausibility>> {
-    let (machine, sources) = (problem.machine, problem.sources);
+    match &problem.sources.replay {
+        Some(replay) => {
+            let sizes = replay.plausibility(unknowns.state())?.into_iter();
+            Ok(sizes
+                .map(|(recording, of_angles, [left, foretold, moved])| Plausibility {
+                    recording,
+                    of_angles,
+                    left,
+                    foretold,
+                    moved,
+                })
+                .collect())
+        }
+        None => Ok(plausibility_of(problem.machine, problem.sources, unknowns)?
+            .into_iter()
+            .map(|(_, p)| p)
+            .collect()),
+    }
+}
+
+/// The same, of recordings whose samples are here, with their numbers.
+pub(super) fn plausibility_of(
+    machine: &Machine,
+    sources: &Sources,
+    unknowns: &Unknowns,
+) -> Result<Vec<(usize, Plausibility)>> {
     let evaluators: Vec<_> = sources.all.iter().map(|s| Evaluator::new(machine, unknowns, s)).collect();
     // Standard deviation of an even spread.
     let spread = |c: usize, (from, to): &(f64, f64)| {
@@ -162,19 +187,20 @@ pub(super) fn plausibility(problem: &Problem, unknowns: &Unknowns) -> Result<Vec
         },
     )?;
     let mut all = Vec::new();
-    for (source, mut sizes) in sources.all.iter().zip(sizes) {
+    for (number, (source, mut sizes)) in sources.all.iter().zip(sizes).enumerate() {
         for quantity in [Quantity::Length, Quantity::Angle] {
             let sizes = &mut sizes[quantity];
             if sizes.left.is_empty() {
                 continue;
             }
-            all.push(Plausibility {
+            let plausibility = Plausibility {
                 recording: source.label.clone(),
                 of_angles: quantity == Quantity::Angle,
                 left: quantile(&mut sizes.left),
                 foretold: quantile(&mut sizes.foretold),
                 moved: quantile(&mut sizes.moved),
-            });
+            };
+            all.push((number, plausibility));
         }
     }
     Ok(all)

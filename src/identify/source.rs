@@ -1,10 +1,12 @@
-//! Recordings as the identification sees them: passes over chunks of samples, from memory while they fit, else from disk.
+//! Recordings as the identification sees them: passes over chunks of samples on all cores.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::Approach;
+use super::replay::Replay;
 use super::stretch::{Beginning, Memories, Stretch, stretches};
 use crate::error::Result;
 use crate::feature::{Feature, gravity_of};
@@ -15,10 +17,12 @@ use crate::sensor::Sensor;
 use crate::units::Quantity;
 use crate::variation::Varying;
 
-/// As many samples in all are kept in memory; larger sets are read again in every pass.
+/// Features of as many samples in all are kept in memory; those of larger sets are taken anew in every pass.
 const CACHED_SAMPLES: u64 = 2_000_000;
-/// Chunks that are worked on at a time when reading from disk.
-const BATCH: usize = 16;
+/// Chunks that are worked on at a time: what they add waits until all are done.
+const BATCH: usize = 64;
+/// The same where one thread goes along the path before.
+const BATCH_ALONG: usize = 16;
 
 /// A value that is known, or the index of the unknown that stands for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,6 +140,8 @@ pub(crate) struct Sources<'a> {
     pub lengths: Vec<usize>,
     machine: &'a Machine,
     varying: &'a Varying,
+    /// What passes have brought elsewhere, where the samples are not here.
+    pub replay: Option<Arc<Replay>>,
     /// Motion against the direction of travel that counts as a reversal beyond this, by command, m or rad.
     pub dead_bands: Vec<f64>,
 }
@@ -152,7 +158,7 @@ fn index_of<T: PartialEq>(list: &mut Vec<T>, item: T) -> usize {
 }
 
 impl<'a> Sources<'a> {
-    /// Scans every recording once (all its rows are checked here) and keeps the samples if they are few enough.
+    /// Scans every recording once (all its rows are checked here), and keeps what varies with the path if the samples are few enough.
     pub fn new(
         recordings: &'a [Recording],
         machine: &'a Machine,
@@ -160,6 +166,34 @@ impl<'a> Sources<'a> {
         dead_bands: &[Option<f64>],
         progress: &dyn Fn(&str),
     ) -> Result<Self> {
+        let mut summaries = Vec::with_capacity(recordings.len());
+        for recording in recordings {
+            progress(&format!("reading {}", recording.name()));
+            summaries.push(recording.scan()?);
+        }
+        let mut sources = Sources::of(recordings, summaries, machine, varying, dead_bands);
+        if !varying.is_constant() {
+            for source in &mut sources.all {
+                let beginning = Beginning::of(source.recording, machine, varying, &sources.dead_bands)?;
+                source.beginning = Some(beginning);
+            }
+        }
+        let in_memory = |s: &Source| s.recording.stored().is_some_and(|stored| stored.is_in_memory());
+        let is_small = sources.samples() <= CACHED_SAMPLES && sources.all.iter().all(in_memory);
+        if !varying.is_constant() && is_small {
+            sources.cache()?;
+        }
+        Ok(sources)
+    }
+
+    /// Recordings of which it is known what they hold; none is read.
+    pub fn of(
+        recordings: &'a [Recording],
+        summaries: Vec<Summary>,
+        machine: &'a Machine,
+        varying: &'a Varying,
+        dead_bands: &[Option<f64>],
+    ) -> Self {
         let commands = machine.commands().len();
         let mut sources = Sources {
             all: Vec::new(),
@@ -171,13 +205,10 @@ impl<'a> Sources<'a> {
             lengths: Vec::new(),
             machine,
             varying,
+            replay: None,
             dead_bands: Vec::new(),
         };
-        let mut samples = 0;
-        for recording in recordings {
-            progress(&format!("reading {}", recording.name()));
-            let summary = recording.scan()?;
-            samples += summary.samples;
+        for (recording, summary) in recordings.iter().zip(summaries) {
             let namesakes = recordings.iter().filter(|r| r.name() == recording.name()).count();
             sources.add(recording, label(recording, namesakes > 1), summary, machine);
         }
@@ -190,16 +221,7 @@ impl<'a> Sources<'a> {
                 given.unwrap_or(DEAD_BAND * (high - low).max(0.0))
             })
             .collect();
-        if !varying.is_constant() {
-            for source in &mut sources.all {
-                let beginning = Beginning::of(source.recording, machine, varying, &sources.dead_bands)?;
-                source.beginning = Some(beginning);
-            }
-        }
-        if samples <= CACHED_SAMPLES {
-            sources.cache()?;
-        }
-        Ok(sources)
+        sources
     }
 
     /// Keeps all samples with their features in memory.
@@ -382,10 +404,20 @@ impl<'a> Sources<'a> {
                 parts.into_iter().flatten().for_each(|part| merge(index, part));
                 continue;
             }
+            if let (Some(stored), None) = (source.recording.stored(), &source.beginning) {
+                let commands = self.machine.commands().len();
+                for from in (0..stored.len()).step_by(BATCH) {
+                    let part = |i| Ok(on(&Stretch::plain(stored.chunk(i)?, commands)));
+                    let batch = from..stored.len().min(from + BATCH);
+                    let parts = batch.into_par_iter().map(part).collect::<Result<Vec<_>>>()?;
+                    parts.into_iter().flatten().for_each(|part| merge(index, part));
+                }
+                continue;
+            }
             let mut stretches =
                 source.stretches(self.machine, self.varying, &self.dead_bands, &mut memories)?;
             loop {
-                let batch: Vec<Stretch> = stretches.by_ref().take(BATCH).collect::<Result<_>>()?;
+                let batch: Vec<Stretch> = stretches.by_ref().take(BATCH_ALONG).collect::<Result<_>>()?;
                 if batch.is_empty() {
                     break;
                 }

@@ -2,6 +2,7 @@
 
 use super::evaluator::{Evaluator, Moment};
 use super::noise::Noise;
+use super::replay::Few;
 use super::source::Sources;
 use super::unknowns::Unknowns;
 use crate::error::Result;
@@ -22,13 +23,21 @@ pub(crate) struct Thin {
 
 /// Evenly spread samples of every recording.
 pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
+    if let Some(replay) = &sources.replay {
+        let of = |(source, own): (usize, &Few)| {
+            let thin = own.iter().cloned().map(|(q, values)| Thin { source, q, values });
+            thin.collect::<Vec<_>>()
+        };
+        return Ok(replay.thin.iter().enumerate().flat_map(of).collect());
+    }
     let commands = machine.commands().len();
     let mut seen = vec![0u64; sources.all.len()];
     let mut all = Vec::new();
     // The chunks come in order, so the running number of a sample is known when they are merged.
     sources.pass(
-        |_, stretch| (stretch.chunk.commands.clone(), stretch.chunk.values.clone(), stretch.chunk.len),
-        |index, (q, values, len)| {
+        |_, stretch| stretch.chunk.clone(),
+        |index, chunk| {
+            let (q, values, len) = (&chunk.commands, &chunk.values, chunk.len);
             let source = &sources.all[index];
             let width = source.recording.value_count();
             let stride = source.summary.samples.div_ceil(MOST).max(1);

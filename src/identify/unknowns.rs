@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::replay::State;
 use super::set_up_values::SetUpValues;
 use super::source::{Known, Source, Sources};
 use crate::chain::Chain;
@@ -186,6 +187,31 @@ impl Unknowns {
             coefficients: vec![0.0; varying.terms.len()],
             motions: Vec::new(),
         }
+    }
+
+    /// What there is of it where nothing varies.
+    pub fn state(&self) -> State {
+        let SetUpValues { tool_points, zeros, lengths, tool_rotations } = self.values.clone();
+        let setups = self.setups.iter().map(|s| (s.previous_from_w, s.dh, s.unknown)).collect();
+        State { dh: self.dh.clone(), setups, tool_points, zeros, lengths, tool_rotations }
+    }
+
+    /// The same unknowns with other values; none where those are of other recordings.
+    pub fn at(&self, state: &State) -> Option<Self> {
+        let State { dh, setups, tool_points, zeros, lengths, tool_rotations } = state.clone();
+        let frame = |(previous_from_w, dh, unknown)| SetupFrame { previous_from_w, dh, unknown };
+        let found = Unknowns {
+            dh,
+            setups: setups.into_iter().map(frame).collect(),
+            values: SetUpValues { tool_points, zeros, lengths, tool_rotations },
+            ..self.clone()
+        };
+        let sizes = |u: &Unknowns| {
+            let v = &u.values;
+            let of_values = [v.tool_points.len(), v.zeros.len(), v.lengths.len(), v.tool_rotations.len()];
+            (u.dh.len(), u.setups.len(), of_values)
+        };
+        (sizes(&found) == sizes(self)).then_some(found)
     }
 
     /// The chain that a source's set-up sees, with constant deviations alone.

@@ -1,6 +1,6 @@
 //! A recording thinned to what mistakes are tried on.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
 use crate::error::Result;
@@ -53,19 +53,16 @@ impl Thinned {
         let (commands, values) = (recording.fixed().len(), recording.value_count());
         let shifts = -(SHIFTS as i64)..=SHIFTS as i64;
         let rows = |pick: u64| shifts.clone().map(move |by| pick.saturating_add_signed(by).min(total - 1));
-        let wanted: HashSet<u64> = picks.iter().flat_map(|pick| rows(*pick)).collect();
+        let wanted: BTreeSet<u64> = picks.iter().flat_map(|pick| rows(*pick)).collect();
         let mut known: HashMap<u64, Sample> = HashMap::new();
-        let mut seen = 0;
-        for chunk in recording.chunks()? {
-            let chunk = chunk?;
-            for k in 0..chunk.len {
-                if wanted.contains(&seen) {
-                    let row = |all: &[f64], width: usize| all[k * width..(k + 1) * width].to_vec();
-                    let (commands, values) = (row(&chunk.commands, commands), row(&chunk.values, values));
-                    let (line, time) = (chunk.lines[k], chunk.time.as_ref().map(|t| t[k]));
-                    known.insert(seen, Sample { line, time, commands, values });
-                }
-                seen += 1;
+        for chunk in recording.chunks_with(&wanted)? {
+            let (first, chunk) = chunk?;
+            for number in wanted.range(first..first + chunk.len as u64) {
+                let k = (number - first) as usize;
+                let row = |all: &[f64], width: usize| all[k * width..(k + 1) * width].to_vec();
+                let (commands, values) = (row(&chunk.commands, commands), row(&chunk.values, values));
+                let (line, time) = (chunk.lines[k], chunk.time.as_ref().map(|t| t[k]));
+                known.insert(*number, Sample { line, time, commands, values });
             }
         }
         let window = |pick: &u64| rows(*pick).filter_map(|row| known.get(&row).cloned()).collect();

@@ -1,10 +1,12 @@
 //! Numbers as text with a fixed count of digits: what `{:.12e}` writes, in a fraction of its time.
 
-use std::f64::consts::LOG10_2;
-use std::fmt::Write;
+use std::io::Write;
 
 /// Most digits behind the point.
 const MOST: usize = 15;
+
+/// Of 2, times 2^20, rounded down.
+const LOG10_2: i32 = 315_652;
 
 /// `5^0` to `5^27`: all that 64 bits hold.
 const FIVES: [u64; 28] = powers(5);
@@ -20,33 +22,47 @@ const fn powers<const N: usize>(base: u64) -> [u64; N] {
     all
 }
 
+/// Two digits at a time.
+const PAIRS: [[u8; 2]; 100] = pairs();
+
+const fn pairs() -> [[u8; 2]; 100] {
+    let mut all = [[0; 2]; 100];
+    let mut k = 0;
+    while k < 100 {
+        all[k] = [b'0' + (k / 10) as u8, b'0' + (k % 10) as u8];
+        k += 1;
+    }
+    all
+}
+
 /// Appends a number as `{:.decimals$e}` does, with at most 15 decimals: correctly rounded, a tie to the even digit.
-pub(super) fn push(text: &mut String, value: f64, decimals: usize) {
-    let Some((mut digits, exponent)) = rounded(value.abs(), decimals) else {
-        // A string takes everything.
+pub(super) fn push(text: &mut Vec<u8>, value: f64, decimals: usize) {
+    let Some((digits, exponent)) = rounded(value.abs(), decimals) else {
+        // Memory takes everything.
         let _ = write!(text, "{value:.decimals$e}");
         return;
     };
-    let mut written = [b'0'; MOST + 1];
-    for place in written[..=decimals].iter_mut().rev() {
-        *place = b'0' + (digits % 10) as u8;
-        digits /= 10;
+    // All digits with zeros before them, from the right, in halves that are worked on side by side.
+    let mut written = [[b'0'; 2]; MOST.div_ceil(2)];
+    let (upper, lower) = ((digits / 100_000_000) as u32, (digits % 100_000_000) as u32);
+    for (half, mut rest) in written.chunks_exact_mut(4).zip([upper, lower]) {
+        for pair in half.iter_mut().rev() {
+            *pair = PAIRS[(rest % 100) as usize];
+            rest /= 100;
+        }
     }
+    let written = &written.as_flattened()[MOST - decimals..];
     if value.is_sign_negative() {
-        text.push('-');
+        text.push(b'-');
     }
-    let written = std::str::from_utf8(&written[..=decimals]).unwrap_or_default();
-    let (first, behind) = written.split_at(1);
-    text.push_str(first);
+    text.push(written[0]);
     if decimals > 0 {
-        text.push('.');
-        text.push_str(behind);
+        text.push(b'.');
+        text.extend_from_slice(&written[1..]);
     }
-    text.push_str(if exponent < 0 { "e-" } else { "e" });
-    if exponent.abs() >= 10 {
-        text.push(char::from(b'0' + (exponent.abs() / 10) as u8));
-    }
-    text.push(char::from(b'0' + (exponent.abs() % 10) as u8));
+    text.extend_from_slice(if exponent < 0 { b"e-" } else { b"e" });
+    let exponent = PAIRS[exponent.unsigned_abs() as usize % 100];
+    text.extend_from_slice(if exponent[0] == b'0' { &exponent[1..] } else { &exponent });
 }
 
 /// The first `decimals + 1` digits of a positive number as an integer, and the power of ten of the first; `None` where exact integers do not
@@ -59,7 +75,7 @@ fn rounded(value: f64, decimals: usize) -> Option<(u64, i32)> {
     let bits = value.to_bits();
     let (mantissa, power) = (bits & ((1 << 52) - 1) | 1 << 52, ((bits >> 52) & 0x7ff) as i32 - 1075);
     // The value is below 2^(power + 53): the exponent is this one or the one below.
-    let mut exponent = (f64::from(power + 53) * LOG10_2).floor() as i32;
+    let mut exponent = ((power + 53) * LOG10_2) >> 20;
     loop {
         // digits = mantissa * 5^scale * 2^(scale + power)
         let scale = decimals as i32 - exponent;
@@ -92,9 +108,13 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     fn alike(value: f64, decimals: usize) {
-        let mut text = String::new();
+        let mut text = Vec::new();
         push(&mut text, value, decimals);
-        assert_eq!(text, format!("{value:.decimals$e}"), "{value:?} with {decimals} decimals");
+        assert_eq!(
+            String::from_utf8_lossy(&text),
+            format!("{value:.decimals$e}"),
+            "{value:?} with {decimals} decimals"
+        );
     }
 
     #[test]

@@ -43,27 +43,33 @@ impl<'a> Table<'a> {
         writeln!(out)
     }
 
+    /// Bytes that a row takes up behind what it is written in, at most.
+    pub fn width(&self) -> usize {
+        // Comma, sign, digits, point and exponent.
+        2 + self.columns.len() * (OF_MODEL + OF_RESIDUAL + 18)
+    }
+
     /// Appends a drop-out.
-    pub fn push_dropped(&self, row: &str, text: &mut String) {
-        text.push_str(row);
-        text.push_str(&self.empty);
-        text.push('\n');
+    pub fn push_dropped(&self, row: &str, text: &mut Vec<u8>) {
+        text.extend_from_slice(row.as_bytes());
+        text.extend_from_slice(self.empty.as_bytes());
+        text.push(b'\n');
     }
 
     /// Appends a row, with `,model,residual` of every measured column.
-    pub fn push(&self, row: &str, measured: &[f64], residuals: &[f64], text: &mut String) {
-        text.push_str(row);
+    pub fn push(&self, row: &str, measured: &[f64], residuals: &[f64], text: &mut Vec<u8>) {
+        text.extend_from_slice(row.as_bytes());
         for (i, column) in self.columns.iter().enumerate().take(residuals.len().min(3)) {
             column.push(measured[i] - residuals[i], residuals[i], text);
         }
         if matches!(self.sensor, Sensor::Pose) {
             self.push_rotation(row, measured, residuals, text);
         }
-        text.push('\n');
+        text.push(b'\n');
     }
 
     /// `R_model = exp(φ)⁻¹ R_measured`, in the form in which it was measured.
-    fn push_rotation(&self, row: &str, measured: &[f64], residuals: &[f64], text: &mut String) {
+    fn push_rotation(&self, row: &str, measured: &[f64], residuals: &[f64], text: &mut Vec<u8>) {
         let turn = |x: &[f64]| Pose::exp(Twist::new(Vec3([0.0; 3]), Vec3([x[0], x[1], x[2]])));
         let seen = turn(&measured[3..6]);
         let model = turn(&residuals[3..6]).inverse() * seen;
@@ -94,10 +100,10 @@ impl<'a> Table<'a> {
 }
 
 impl Measured {
-    fn push(&self, model: f64, residual: f64, text: &mut String) {
-        text.push(',');
+    fn push(&self, model: f64, residual: f64, text: &mut Vec<u8>) {
+        text.push(b',');
         decimal::push(text, self.unit.from_si(model), OF_MODEL);
-        text.push(',');
+        text.push(b',');
         decimal::push(text, self.unit.from_si(residual), OF_RESIDUAL);
     }
 }

@@ -108,6 +108,7 @@ impl Recording {
         let bytes = Source::Bytes(joined.text.into_bytes().into());
         let mut recording = Recording::read(self.path.clone(), bytes, &self.machine)?;
         recording.warnings.clone_from(&self.warnings);
+        recording.memory = self.memory.clone();
         recording.warnings.push(format!(
             "{} columns of {} are laid beside it, row by row: both have the same {}",
             joined.added.len(),

@@ -1,77 +1,52 @@
-//! From rows to chunks: one pass over the data, bounded memory, SI.
+//! From pieces to chunks: one pass over the data, piece by piece on all cores, bounded memory, SI.
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::Recording;
-use super::RecordingFault as Fault;
-use super::column::{Column, Layout, Role};
-use super::header::{Measurement, known_key};
-use super::lines::{Line, Lines};
-use super::text::{self, Fail, LARGEST, LARGEST_OTHER};
-use crate::error::Result;
-
-/// Most samples that a chunk holds.
-pub(super) const CHUNK: usize = 4096;
-
-/// Consecutive samples of a recording, drop-outs left out; m, rad, s, K.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Chunk {
-    /// How many samples there are, at most 4096; 0 only where nothing but drop-outs was left.
-    pub len: usize,
-    /// Line of each sample in the file, from 1.
-    pub lines: Vec<u64>,
-    /// Time of each sample, s, if the recording has a column `t`.
-    pub time: Option<Vec<f64>>,
-    /// Commanded displacements, m or rad: `len` rows of [`Machine::commands`](crate::Machine::commands).
-    pub commands: Vec<f64>,
-    /// Measured numbers, m or rad: `len` rows of [`Measurement::value_count`]; a pose is `px py pz rx ry rz`.
-    pub values: Vec<f64>,
-    /// Per command its direction of approach (-1, 0, +1) for each sample, if the recording has such a column.
-    pub directions: Vec<Option<Vec<f64>>>,
-    /// Per extra channel its value for each sample, SI; NaN where the cell is empty.
-    pub channels: Vec<Vec<f64>>,
-    /// Rows left out while this chunk was read.
-    pub dropped: u64,
-}
-
-impl Chunk {
-    /// Bytes that its numbers take up.
-    pub(super) fn bytes(&self) -> usize {
-        let optional = self.time.iter().chain(self.directions.iter().flatten()).map(Vec::len).sum::<usize>();
-        let channels = self.channels.iter().map(Vec::len).sum::<usize>();
-        8 * (self.lines.len() + self.commands.len() + self.values.len() + optional + channels)
-    }
-
-    /// These samples alone, by their index; the count of dropped rows is left behind.
-    pub fn chosen(&self, samples: &[usize]) -> Chunk {
-        let rows = |all: &[f64]| -> Vec<f64> {
-            let width = all.len() / self.len.max(1);
-            samples.iter().flat_map(|k| all[k * width..(k + 1) * width].iter().copied()).collect()
-        };
-        Chunk {
-            len: samples.len(),
-            lines: samples.iter().filter_map(|k| self.lines.get(*k).copied()).collect(),
-            time: self.time.as_deref().map(rows),
-            commands: rows(&self.commands),
-            values: rows(&self.values),
-            directions: self.directions.iter().map(|d| d.as_deref().map(rows)).collect(),
-            channels: self.channels.iter().map(|c| rows(c)).collect(),
-            dropped: 0,
-        }
-    }
-}
+use super::chunk::Chunk;
+use super::kept::{Kept, Stored};
+use super::pieces::Pieces;
+use super::rows::{Parsed, Reader, RowAt};
+use super::text::Fail;
+use crate::error::{Error, Result};
 
 /// Samples of one pass, in chunks; see [`Recording::chunks`].
 pub struct Chunks<'a>(Origin<'a>);
 
 enum Origin<'a> {
-    Memory(std::slice::Iter<'a, Arc<Chunk>>),
-    File(Box<Read<'a>>),
+    Kept { stored: &'a Stored, next: usize },
+    File { reading: Box<Reading<'a>>, ready: std::vec::IntoIter<Chunk> },
 }
 
 impl<'a> Chunks<'a> {
-    pub(super) fn kept(chunks: &'a [Arc<Chunk>]) -> Self {
-        Chunks(Origin::Memory(chunks.iter()))
+    pub(super) fn kept(kept: &'a Kept) -> Self {
+        let stored: &'a Stored = &kept.stored;
+        Chunks(Origin::Kept { stored, next: 0 })
+    }
+
+    pub(super) fn of(reading: Reading<'a>) -> Self {
+        Chunks(Origin::File { reading: Box::new(reading), ready: Vec::new().into_iter() })
+    }
+
+    /// The next chunk; what is in memory is not copied.
+    pub(super) fn shared(&mut self) -> Option<Result<Arc<Chunk>>> {
+        match &mut self.0 {
+            Origin::Kept { stored, next } => {
+                let i = std::mem::replace(next, *next + 1);
+                (i < stored.len()).then(|| stored.chunk(i))
+            }
+            Origin::File { reading, ready } => loop {
+                if let Some(chunk) = ready.next() {
+                    return Some(Ok(Arc::new(chunk)));
+                }
+                match reading.next()? {
+                    Ok(parsed) => *ready = parsed.chunks.into_iter(),
+                    Err(error) => return Some(Err(error)),
+                }
+            },
+        }
     }
 }
 
@@ -79,48 +54,20 @@ impl Iterator for Chunks<'_> {
     type Item = Result<Chunk>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        match &mut self.0 {
-            Origin::Memory(chunks) => chunks.next().map(|chunk| Ok(Chunk::clone(chunk))),
-            Origin::File(read) => read.next(),
-        }
-    }
-}
-
-/// Samples as they are read.
-pub(super) struct Read<'a> {
-    pub pass: Pass<'a>,
-    ended: bool,
-}
-
-impl Iterator for Read<'_> {
-    type Item = Result<Chunk>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
-        let mut chunk = self.pass.empty();
-        while chunk.len < CHUNK {
-            match self.pass.row(&mut chunk) {
-                Ok(Some(_)) => {}
-                Ok(None) => {
-                    self.ended = true;
-                    return (chunk.len > 0 || chunk.dropped > 0).then_some(Ok(chunk));
-                }
-                Err(error) => {
-                    self.ended = true;
-                    return Some(Err(error));
-                }
-            }
-        }
-        Some(Ok(chunk))
+        Some(self.shared()?.map(Arc::unwrap_or_clone))
     }
 }
 
 /// Rows of one pass with their text, in blocks; see [`Recording::rows_with_text`].
 pub struct Rows<'a> {
-    pass: Pass<'a>,
-    ended: bool,
+    reading: Reading<'a>,
+    ready: std::vec::IntoIter<Block>,
+}
+
+impl<'a> Rows<'a> {
+    pub(super) fn of(reading: Reading<'a>) -> Self {
+        Rows { reading, ready: Vec::new().into_iter() }
+    }
 }
 
 /// At most 4096 rows as written, and the samples that are in them.
@@ -128,8 +75,8 @@ pub struct Rows<'a> {
 pub struct Block {
     /// The samples; its `len` is smaller than the number of rows where there are drop-outs, and may be 0.
     pub chunk: Chunk,
-    text: String,
-    rows: Vec<(u64, usize, Option<usize>)>,
+    text: Arc<String>,
+    rows: Vec<RowAt>,
 }
 
 /// A row as written.
@@ -146,11 +93,9 @@ pub struct Row<'a> {
 impl Block {
     /// The rows in the order of the file; comments and blank lines between them are left out.
     pub fn rows(&self) -> impl Iterator<Item = Row<'_>> {
-        let mut from = 0;
-        self.rows.iter().map(move |(line, to, sample)| {
-            let text = &self.text[from..*to];
-            from = *to;
-            Row { line: *line, text, sample: *sample }
+        self.rows.iter().map(|row| {
+            let text = self.text.get(row.text.clone()).unwrap_or_default();
+            Row { line: row.line, text, sample: row.sample }
         })
     }
 }
@@ -159,287 +104,290 @@ impl Iterator for Rows<'_> {
     type Item = Result<Block>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.ended {
-            return None;
-        }
-        let mut block = Block { chunk: self.pass.empty(), text: String::new(), rows: Vec::new() };
-        while block.rows.len() < CHUNK {
-            let before = block.chunk.len;
-            let row = self.pass.row(&mut block.chunk).and_then(|line| {
-                let text = line.map(|line| self.pass.text(line)).transpose()?;
-                Ok(text.map(|text| block.text.push_str(text)))
-            });
-            match row {
-                Ok(Some(())) => {
-                    let sample = (block.chunk.len > before).then_some(before);
-                    block.rows.push((self.pass.lines.number, block.text.len(), sample));
+        loop {
+            if let Some(block) = self.ready.next() {
+                return Some(Ok(block));
+            }
+            match self.reading.next()? {
+                Ok(Parsed { chunks, rows, text, .. }) => {
+                    let text = Arc::new(text);
+                    let blocks = chunks.into_iter().zip(rows);
+                    let blocks: Vec<Block> =
+                        blocks.map(|(chunk, rows)| Block { chunk, text: text.clone(), rows }).collect();
+                    self.ready = blocks.into_iter();
                 }
-                Ok(None) => {
-                    self.ended = true;
-                    return (!block.rows.is_empty()).then_some(Ok(block));
-                }
-                Err(error) => {
-                    self.ended = true;
-                    return Some(Err(error));
-                }
+                Err(error) => return Some(Err(error)),
             }
         }
-        Some(Ok(block))
     }
 }
 
-/// One pass over the rows of a recording.
-pub(super) struct Pass<'a> {
-    recording: &'a Recording,
-    lines: Lines,
-    /// The row at hand, SI, in the order of the columns.
-    cells: Vec<f64>,
-    limits: Vec<f64>,
-    /// Columns without which a row is a drop-out.
-    needed: Vec<usize>,
+/// One pass over the rows of a recording, piece by piece in the order of the file.
+pub(super) struct Reading<'a> {
+    reader: Reader<'a>,
+    pieces: Pieces,
+    /// Pieces that are read and not yet parsed.
+    ahead: Vec<Vec<u8>>,
+    begun: bool,
+    /// Why no further piece comes, where that is a fault.
+    stopped: Option<Error>,
+    ready: std::vec::IntoIter<Result<Parsed>>,
+    /// Lines before the next piece.
+    lines: u64,
     previous_time: Option<f64>,
-    /// Rows so far.
-    pub rows: u64,
-    /// Per column how many rows were dropped because of it.
-    pub drops: Vec<u64>,
-    /// Per follower the worst difference from its coupling (m or rad) and its line.
-    pub worst: Vec<(f64, u64)>,
 }
 
-impl<'a> Pass<'a> {
-    pub fn start(recording: &'a Recording) -> Result<Self> {
-        let layout = &recording.layout;
-        let other = |role| matches!(role, Role::Time | Role::Channel(_));
-        let limits = layout.columns.iter().map(|c| if other(c.role) { LARGEST_OTHER } else { LARGEST });
-        let idle = |c: &Column| match c.role {
-            Role::Channel(_) => recording.machine.side_joint(&c.name).is_none(),
-            role => matches!(role, Role::Follower(_)),
-        };
-        let width = layout.columns.len();
-        Ok(Pass {
-            recording,
-            lines: recording.data_lines()?,
-            cells: vec![0.0; width],
-            limits: limits.collect(),
-            needed: (0..width).filter(|i| !idle(&layout.columns[*i])).collect(),
+impl<'a> Reading<'a> {
+    pub fn start(recording: &'a Recording, with_text: bool) -> Result<Self> {
+        let (lines, offset) = recording.data_from;
+        Ok(Reading {
+            reader: Reader::new(recording, with_text),
+            pieces: Pieces::new(recording.source.read_from(&recording.path, offset)?),
+            ahead: Vec::new(),
+            begun: false,
+            stopped: None,
+            ready: Vec::new().into_iter(),
+            lines,
             previous_time: None,
-            rows: 0,
-            drops: vec![0; width],
-            worst: vec![(0.0, 0); layout.followers.len()],
         })
     }
 
-    pub fn chunks(self) -> Chunks<'a> {
-        Chunks(Origin::File(Box::new(self.read())))
-    }
-
-    pub fn read(self) -> Read<'a> {
-        Read { pass: self, ended: false }
-    }
-
-    pub fn with_text(self) -> Rows<'a> {
-        Rows { pass: self, ended: false }
-    }
-
-    fn empty(&self) -> Chunk {
-        let layout = &self.recording.layout;
-        Chunk {
-            time: layout.time.map(|_| Vec::new()),
-            directions: layout.directions.iter().map(|d| d.map(|_| Vec::new())).collect(),
-            channels: vec![Vec::new(); layout.channels.len()],
-            ..Chunk::default()
-        }
-    }
-
-    fn text(&self, line: Line) -> Result<&str> {
-        std::str::from_utf8(self.lines.bytes(line.content)).map_err(|_| self.fail(0, Fault::NotUtf8))
-    }
-
-    fn fail(&self, column: usize, fault: Fault) -> crate::error::Error {
-        self.recording.error(Fail::at(self.lines.number, column, fault))
-    }
-
-    /// Reads the next row into the chunk, or counts it there as dropped; `None` at the end of the file.
-    fn row(&mut self, chunk: &mut Chunk) -> Result<Option<Line>> {
-        loop {
-            let line = self.lines.next().map_err(|stop| self.recording.stopped(stop, self.lines.number))?;
-            let Some(line) = line else { return Ok(None) };
-            let content = self.lines.bytes(line.content.clone());
-            match content.trim_ascii_start().first() {
-                None => continue,
-                Some(b'#') => {
-                    let text = std::str::from_utf8(content).map_err(|_| self.fail(0, Fault::NotUtf8))?;
-                    if let Some(key) = known_key(text) {
-                        return Err(self.fail(0, Fault::LateKey { key: key.into() }));
-                    }
-                    continue;
-                }
-                Some(_) => {}
-            }
-            self.rows += 1;
-            self.parse(&line)?;
-            self.check_time()?;
-            if let Some(column) = self.needed.iter().find(|i| self.cells[**i].is_nan()) {
-                self.drops[*column] += 1;
-                chunk.dropped += 1;
-            } else {
-                self.push(chunk, &line)?;
-            }
-            return Ok(Some(line));
-        }
-    }
-
-    /// All cells of the row, in SI; NaN for an empty one.
-    fn parse(&mut self, line: &Line) -> Result<()> {
-        let columns = &self.recording.layout.columns;
-        let (mut found, mut wrong) = (0, None);
-        let content = self.lines.bytes(line.content.clone());
-        text::split(content, |field| {
-            if let Some(cell) = self.cells.get_mut(found) {
-                match text::number(field) {
-                    Some(value) => {
-                        *cell = columns[found].unit.to_si(value);
-                        // A NaN passes; an infinity does not.
-                        if cell.abs() > self.limits[found] {
-                            wrong.get_or_insert(found);
-                        }
-                    }
-                    None => {
-                        wrong.get_or_insert(found);
-                    }
+    /// The next pieces, parsed on all cores while those behind them are read; empty at the end. Behind an error nothing comes.
+    pub fn batch(&mut self) -> Vec<Result<Parsed>> {
+        let recording = self.reader.recording;
+        let Reading { reader, pieces, .. } = self;
+        let mut read = |most: usize| {
+            let mut read = Vec::new();
+            while read.len() < most {
+                match pieces.next() {
+                    Ok(Some(piece)) => read.push(piece),
+                    Ok(None) => break,
+                    Err(error) => return (read, Some(Error::file(&recording.path, error))),
                 }
             }
-            found += 1;
-        });
-        if found != columns.len() {
-            return Err(self.fail(0, Fault::Ragged { found, expected: columns.len() }));
-        }
-        let Some(column) = wrong else { return Ok(()) };
-        let field = self.field(line, column);
-        let (what, text) = (self.what(column), text::shown(field));
-        let fault = match text::number(field) {
-            Some(_) => Fault::NotUsable { what, text },
-            None if std::str::from_utf8(field).is_err() => Fault::NotUtf8,
-            None => Fault::NotANumber { what, text },
+            (read, None)
         };
-        Err(self.fail(column + 1, fault))
-    }
-
-    /// A field as written, for messages.
-    fn field(&self, line: &Line, column: usize) -> &[u8] {
-        let (mut n, mut found): (usize, &[u8]) = (0, b"");
-        text::split(self.lines.bytes(line.content.clone()), |field| {
-            if n == column {
-                found = field;
-            }
-            n += 1;
-        });
-        found
-    }
-
-    fn what(&self, column: usize) -> String {
-        format!("column `{}`", text::shown(self.recording.layout.columns[column].name.as_bytes()))
-    }
-
-    /// Time must go forward, over drop-outs too.
-    fn check_time(&mut self) -> Result<()> {
-        let Some(column) = self.recording.layout.time else { return Ok(()) };
-        let t = self.cells[column];
-        if t.is_nan() {
-            return Ok(());
+        if !std::mem::replace(&mut self.begun, true) {
+            // Of many recordings one piece is all there is, or all that is asked for.
+            (self.ahead, self.stopped) = read(1);
         }
-        if let Some(from) = self.previous_time.filter(|from| t <= *from) {
-            let fault =
-                if t < from { Fault::TimeBackwards { from, to: t } } else { Fault::TimeRepeats { t } };
-            return Err(self.fail(column + 1, fault));
+        let present = std::mem::take(&mut self.ahead);
+        if present.is_empty() {
+            return self.stopped.take().map(Err).into_iter().collect();
         }
-        self.previous_time = Some(t);
-        Ok(())
-    }
-
-    fn push(&mut self, chunk: &mut Chunk, line: &Line) -> Result<()> {
-        let Recording { layout, fixed, header, .. } = self.recording;
-        let from = chunk.commands.len();
-        for (column, fixed) in layout.commands.iter().zip(fixed) {
-            chunk.commands.push(column.map_or(fixed.unwrap_or(0.0), |c| self.cells[c]));
-        }
-        self.push_values(layout, header.measurement, chunk)?;
-        for (column, out) in layout.directions.iter().zip(&mut chunk.directions) {
-            let (Some(column), Some(out)) = (column, out) else { continue };
-            let direction = self.cells[*column];
-            if direction != 0.0 && direction.abs() != 1.0 {
-                let (what, text) = (self.what(*column), text::shown(self.field(line, *column)));
-                return Err(self.fail(column + 1, Fault::BadDirection { what, text }));
-            }
-            out.push(direction);
-        }
-        for (i, column) in layout.columns.iter().enumerate() {
-            if let Role::Channel(channel) = column.role {
-                chunk.channels[channel].push(self.cells[i]);
+        let is_over = self.stopped.is_some();
+        let parse = || present.into_par_iter().map(|piece| reader.parse(piece)).collect::<Vec<_>>();
+        let further = || if is_over { (Vec::new(), None) } else { read(2 * rayon::current_num_threads()) };
+        let (parsed, (ahead, stopped)) = rayon::join(parse, further);
+        self.ahead = ahead;
+        self.stopped = self.stopped.take().or(stopped);
+        let mut batch = Vec::with_capacity(parsed.len());
+        for parsed in parsed {
+            batch.push(self.in_place(parsed).map_err(|fail| recording.error(fail)));
+            if matches!(batch.last(), Some(Err(_))) {
+                (self.ahead, self.stopped) = (Vec::new(), None);
+                self.pieces.end();
+                break;
             }
         }
-        if let (Some(time), Some(column)) = (&mut chunk.time, layout.time) {
-            time.push(self.cells[column]);
-        }
-        for ((column, drive), worst) in layout.followers.iter().zip(&mut self.worst) {
-            let coupled: f64 = drive.terms.iter().map(|(c, factor)| factor * chunk.commands[from + c]).sum();
-            let difference = (self.cells[*column] - coupled).abs();
-            if difference > worst.0 {
-                *worst = (difference, self.lines.number);
-            }
-        }
-        chunk.lines.push(self.lines.number);
-        chunk.len += 1;
-        Ok(())
+        batch
     }
 
-    fn push_values(&self, layout: &Layout, measurement: Measurement, chunk: &mut Chunk) -> Result<()> {
-        let cell = |k: usize| self.cells[layout.values[k]];
-        if measurement != Measurement::Pose || layout.values.len() == 6 {
-            chunk.values.extend(layout.values.iter().map(|c| self.cells[*c]));
-            return Ok(());
+    /// What a piece holds, its lines counted from the beginning of the file; its first fault, or that of where it joins the one before.
+    fn in_place(&mut self, mut parsed: Parsed) -> std::result::Result<Parsed, Fail> {
+        let before = self.lines;
+        if let (Some((line, t)), Some(from)) = (parsed.first_time, self.previous_time)
+            && t <= from
+        {
+            return Err(self.reader.time_fault(before + line, from, t));
         }
-        let rotation = rotation_vector([cell(3), cell(4), cell(5), cell(6)])
-            .map_err(|length| self.fail(layout.values[3] + 1, Fault::QuaternionLength { length }))?;
-        chunk.values.extend([cell(0), cell(1), cell(2)]);
-        chunk.values.extend(rotation);
-        Ok(())
+        if let Some(Fail { line, column, fault }) = parsed.fault {
+            return Err(Fail { line: before + line, column, fault });
+        }
+        self.lines += parsed.lines;
+        self.previous_time = parsed.last_time.or(self.previous_time);
+        parsed.move_lines(before);
+        Ok(parsed)
     }
 }
 
-/// Rotation vector (rad, angle in [0, pi]) of a quaternion, scalar part first; its length where that is off by more than 1e-3.
-fn rotation_vector(q: [f64; 4]) -> std::result::Result<[f64; 3], f64> {
-    let length = q.iter().map(|c| c * c).sum::<f64>().sqrt();
-    if (length - 1.0).abs() > 1e-3 {
-        return Err(length);
+impl Iterator for Reading<'_> {
+    type Item = Result<Parsed>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if let Some(parsed) = self.ready.next() {
+            return Some(parsed);
+        }
+        self.ready = self.batch().into_iter();
+        self.ready.next()
     }
-    let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };
-    let (w, u) = (sign * q[0], [sign * q[1], sign * q[2], sign * q[3]]);
-    let sine = u.iter().map(|c| c * c).sum::<f64>().sqrt();
-    // atan2 does not mind that the quaternion is not normalised.
-    let factor = if sine < 1e-12 { 2.0 / w } else { 2.0 * sine.atan2(w) / sine };
-    Ok(u.map(|c| c * factor))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lie::{Pose, Twist};
+    use crate::machine::Machine;
+    use crate::recording::Memory;
+    use std::fmt::Write;
+
+    const ROWS: usize = 60_000;
+
+    fn rig() -> Machine {
+        let text = r#"Machine(
+            name: "rig", units: (length: mm, angle: deg),
+            workpiece: [(frame: "c", joint: Revolute(axis: "z")), (frame: "w")],
+            tool: [
+                (frame: "x", joint: Prismatic(axis: "x")), (frame: "m", joint: Prismatic(axis: "x", follows: {"x": -1})),
+                (frame: "t", at: (0, 0, 100)),
+            ],
+        )"#;
+        Machine::parse("rig.ron", text).expect("a machine")
+    }
+
+    /// Some megabytes of rows, drop-outs, comments and blank lines; what `change` makes of the line of a row.
+    fn text(change: impl Fn(usize, String) -> String) -> String {
+        let mut text =
+            "# measurement: position\nt[s],x[mm],c[deg],m[mm],px[mm],py[mm],pz[mm],u[V]\n".to_string();
+        for i in 0..ROWS {
+            let x = 0.1234567890123 * i as f64;
+            let py = if i % 97 == 0 { String::new() } else { format!("{}", 1.0 / (1.0 + i as f64)) };
+            let c = if i % 1001 == 0 { "\" 1e-3\"".into() } else { format!("{}", i % 360) };
+            let row = format!("{},{x},{c},{},{x},{py},-0.1,1", 1e-3 * i as f64, 1e-5 - x);
+            let _ = writeln!(text, "{}", change(i, row));
+            if i % 5000 == 7 {
+                text += "# a word between\n\n";
+            }
+        }
+        text
+    }
+
+    fn recording(text: &str) -> Recording {
+        Recording::from_bytes("rec.csv", text.as_bytes(), &rig()).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    fn with_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> T {
+        rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("threads").install(work)
+    }
+
+    fn chunks(recording: &Recording) -> Result<Vec<Chunk>> {
+        recording.chunks()?.collect()
+    }
+
+    /// What is in chunks, whatever their bounds.
+    fn joined(chunks: Vec<Chunk>) -> Chunk {
+        let mut all = Chunk { directions: vec![None; 2], channels: vec![Vec::new()], ..Chunk::default() };
+        for chunk in chunks {
+            all.len += chunk.len;
+            all.dropped += chunk.dropped;
+            all.lines.extend(chunk.lines);
+            all.commands.extend(chunk.commands);
+            all.values.extend(chunk.values);
+            all.time.get_or_insert_default().extend(chunk.time.unwrap_or_default());
+            all.channels[0].extend(&chunk.channels[0]);
+        }
+        all
+    }
 
     #[test]
-    fn rotation_vector_of_a_quaternion_is_that_of_the_rotation() {
-        for w in [[0.0, 0.0, 0.0], [1e-9, -2e-9, 0.0], [0.3, -0.2, 0.9], [0.0, 3.1, 0.0]] {
-            let pose = Pose::exp(Twist::from_array([0.0, 0.0, 0.0, w[0], w[1], w[2]]));
-            let q = nalgebra::Isometry3::from(pose).rotation.into_inner();
-            for scale in [1.0, -1.0, 1.0005] {
-                let q = [q.w, q.i, q.j, q.k].map(|c| c * scale);
-                let back = rotation_vector(q).expect("a unit quaternion");
-                for (a, b) in back.iter().zip(w) {
-                    assert!((a - b).abs() < 1e-14, "{back:?} {w:?}");
+    fn pieces_hold_what_the_whole_holds_whatever_the_number_of_threads() {
+        let text = text(|_, row| row);
+        let whole = recording(&text);
+        let (lines, offset) = whole.data_from;
+        let mut parsed = Reader::new(&whole, false).parse(text.as_bytes()[offset as usize..].to_vec());
+        assert!(parsed.fault.is_none() && parsed.chunks.iter().all(|chunk| chunk.len <= 4096));
+        parsed.move_lines(lines);
+        let expected = joined(parsed.chunks);
+        assert_eq!(expected.len as u64 + expected.dropped, ROWS as u64);
+        let summary = whole.scan().expect("rows");
+        for threads in [1, 2, 5] {
+            let again = recording(&text);
+            let (read, scanned) = with_threads(threads, || (chunks(&again), again.scan()));
+            let read = read.expect("rows");
+            assert!(read.len() > ROWS / 4096, "more than one piece");
+            assert_eq!(read, chunks(&whole).expect("rows"), "{threads} threads");
+            assert_eq!(scanned.expect("rows"), summary);
+            assert_eq!(joined(read), expected);
+        }
+        let rows: Vec<String> = whole
+            .rows_with_text()
+            .expect("memory")
+            .flat_map(|block| block.expect("rows").rows().map(|row| row.text.to_string()).collect::<Vec<_>>())
+            .collect();
+        let written: Vec<&str> =
+            text.lines().skip(2).filter(|line| !line.is_empty() && !line.starts_with('#')).collect();
+        assert_eq!(rows, written);
+    }
+
+    #[test]
+    fn the_first_fault_is_told_whatever_piece_it_is_in() {
+        for at in [3usize, 20_000, 40_001, ROWS - 1] {
+            for (wrong, fault) in [("1,2", "row has 2 fields"), ("0,1,2,3,4,5,6,7", "time runs backwards")] {
+                let text = text(|i, row| {
+                    // A later one, of another kind.
+                    if i == at {
+                        wrong.into()
+                    } else if i > at + 10 && i % 9 == 0 {
+                        row + ",x"
+                    } else {
+                        row
+                    }
+                });
+                let line = 1 + text.lines().position(|line| line == wrong).expect("it is there");
+                for threads in [1, 3] {
+                    let recording = recording(&text);
+                    let error = with_threads(threads, || recording.scan()).expect_err(fault).to_string();
+                    assert!(
+                        error.starts_with(&format!("rec.csv:{line}:")) && error.contains(fault),
+                        "{error}"
+                    );
+                    let rows = with_threads(threads, || {
+                        recording
+                            .rows_with_text()
+                            .and_then(|mut rows| rows.try_for_each(|rows| rows.map(drop)))
+                    });
+                    assert_eq!(rows.expect_err(fault).to_string(), error);
                 }
             }
         }
-        assert!(rotation_vector([0.0; 4]).is_err());
-        assert!(rotation_vector([1.0, 0.1, 0.0, 0.0]).is_err());
+    }
+
+    #[test]
+    fn time_goes_forward_from_piece_to_piece() {
+        // All times but the first of a piece are empty, and the row a drop-out: only where pieces join could it run backwards.
+        let bounds = {
+            let text = text(|_, row| row);
+            let whole = recording(&text);
+            let mut reading = Reading::start(&whole, false).expect("memory");
+            let first = reading.next().expect("a piece").expect("rows");
+            first.lines
+        };
+        let text =
+            text(|i, row| if i > 0 { row.replacen(&row[..row.find(',').unwrap_or(0)], "", 1) } else { row });
+        let mut lines: Vec<String> = text.lines().map(String::from).collect();
+        let at = 2 * bounds as usize + 100;
+        let (_, rest) = lines[at].split_once(',').expect("cells");
+        lines[at] = format!("-1,{rest}");
+        let error = recording(&lines.join("\n")).scan().expect_err("backwards");
+        assert!(
+            error.to_string().starts_with(&format!("rec.csv:{}:1: time runs backwards", at + 1)),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn samples_in_a_file_of_numbers_are_those_in_memory() {
+        let text = text(|_, row| row);
+        let kept = recording(&text);
+        for megabytes in [0, 1, 3] {
+            let memory = Memory::of_megabytes(megabytes);
+            let spooled = recording(&text).within(&memory);
+            assert_eq!(spooled.scan().expect("rows"), kept.scan().expect("rows"));
+            assert!(spooled.stored().is_some_and(|stored| !stored.is_in_memory()));
+            assert_eq!(chunks(&spooled).expect("numbers"), chunks(&kept).expect("rows"));
+            let few = recording("# measurement: joint\n# fixed c[deg]: 0\nx[mm],x_meas[mm]\n1,1\n2,2\n")
+                .within(&memory);
+            few.scan().expect("rows");
+            assert_eq!(few.stored().is_some_and(|stored| stored.is_in_memory()), megabytes > 0);
+        }
     }
 }

@@ -540,3 +540,38 @@ fn completions_and_manual_pages_know_every_command() {
     let said = fails(1, &["man", "diagnoze"]);
     assert!(said.contains("\"diagnoze\"") && said.contains("`kincal --help` lists them"), "{said}");
 }
+
+#[test]
+fn parts_are_merged_to_what_calibrate_finds() {
+    let folder = Folder::new("merge");
+    let recordings =
+        [folder.write("a.csv", &tracker("hall", 60)), folder.write("b.csv", &tracker("yard", 50))];
+    let [a, b] = &recordings;
+    let whole = folder.path("whole.ron");
+    done(&["calibrate", MACHINE, a, b, "-o", &whole, "--quiet"]);
+    let mut at: Option<String> = None;
+    for round in 0..40 {
+        let part = |name: &str, rec: &str| {
+            let path = folder.path(&format!("{name}{round}"));
+            let mut args = vec!["normal", MACHINE, rec, "-o", &path, "--quiet"];
+            if let Some(at) = &at {
+                args.extend(["--at", at]);
+            }
+            done(&args);
+            path
+        };
+        let (one, other, next) = (part("a", a), part("b", b), folder.path(&format!("round{round}.ron")));
+        let told = json(&done(&["merge", &one, &other, "-o", &next, "--json", "-"]));
+        if told["converged"] == true {
+            assert_eq!(folder.read(&format!("round{round}.ron")), folder.read("whole.ron"));
+            let error = fails(1, &["normal", MACHINE, a, "--at", &next, "-o", &folder.path("more")]);
+            assert!(error.contains("this is not a round"), "{error}");
+            let error = fails(1, &["normal", MACHINE, a, "--directions", "a", "-o", &folder.path("more")]);
+            assert!(error.contains("pieces by direction of travel cannot be merged"), "{error}");
+            return;
+        }
+        assert_eq!(told["round"], round + 1);
+        at = Some(next);
+    }
+    panic!("no end");
+}

@@ -22,10 +22,12 @@ const fn row(
     Row { command, besides, reads, writes }
 }
 
-const TABLE: [Row; 18] = [
+const TABLE: [Row; 20] = [
     row("describe", &[], &["MACHINE.ron", "REC.csv"], &["--json"]),
     row("check", &[], &["MACHINE.ron"], &["--json"]),
     row("calibrate", &[], &["MACHINE.ron", "REC.csv"], &["--output", "--report", "--json"]),
+    row("normal", &[], &["MACHINE.ron", "REC.csv", "--at"], &["--output", "--json"]),
+    row("merge", &[], &["PART.ron"], &["--output", "--json"]),
     row("compare", &[], &["MACHINE.ron", "REC.csv", "--judge", "--truth"], &["--json"]),
     row("predict", &[], &["CALIBRATED.ron", "REC.csv", "BESIDE.csv"], &["--output", "--json"]),
     row("join", &["--as", "n"], &["REC.csv", "OTHER.csv"], &["--output", "--json"]),
@@ -70,7 +72,8 @@ impl Row {
             command.args([name, path]);
         }
         // What a command cannot do without.
-        let needs_output = ["join", "simulate", "new", "import", "convert"].contains(&self.command);
+        let needs_output =
+            ["normal", "merge", "join", "simulate", "new", "import", "convert"].contains(&self.command);
         if needs_output && written.iter().all(|(name, _)| *name != "--output") {
             command.args(["--output", "elsewhere"]);
         }

@@ -49,3 +49,38 @@ fn a_link_stays_a_link_and_a_file_keeps_who_may_read_it() {
     let there = std::fs::metadata(&file).expect("there");
     assert!(there.len() > 100 && there.permissions().mode() & 0o777 == 0o600);
 }
+
+#[test]
+fn samples_beyond_memory_go_to_a_file_of_which_nothing_is_left() {
+    let folder = Folder::new("spool");
+    let rec = folder.0.join("rec.csv");
+    let made = command()
+        .args(["simulate", "machines/scara.ron", "--test", "poses", "--random", "1", "--count", "200", "-o"])
+        .arg(&rec)
+        .output()
+        .expect("it runs");
+    assert!(made.status.success());
+    let calibrate = |memory: &str, temporary: &Path| {
+        let run = command()
+            .args(["calibrate", "machines/scara.ron", "--memory", memory])
+            .arg(&rec)
+            .env("TMPDIR", temporary)
+            .output()
+            .expect("it runs");
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        (run.status.code(), text(&run.stdout), text(&run.stderr))
+    };
+    let temporary = folder.0.join("temporary");
+    std::fs::create_dir(&temporary).expect("a folder");
+    let in_memory = calibrate("128", &temporary);
+    assert_eq!(in_memory.0, Some(0), "{}", in_memory.2);
+    assert_eq!(calibrate("0", &temporary), in_memory);
+    assert_eq!(std::fs::read_dir(&temporary).expect("a folder").count(), 0, "nothing is left behind");
+    let (status, _, error) = calibrate("0", &temporary.join("nowhere"));
+    assert_eq!(status, Some(1));
+    assert!(error.contains("samples that memory has no room for cannot be written here"), "{error}");
+    assert!(
+        error.contains("= keep more in memory (`--memory MB`), or let the variable TMPDIR name"),
+        "{error}"
+    );
+}

@@ -31,6 +31,7 @@ mod lie;
 mod machines;
 mod mutated_inputs;
 mod nc;
+mod partial;
 mod recordings;
 mod rooms;
 mod simulate;

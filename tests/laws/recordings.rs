@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::common::read_or_refused;
-use kincal::recording::{Chunk, Measurement, NominalLength, Recording, RecordingFault, Role, ToolPoint};
+use kincal::identify::{CalibrateOptions, calibrate};
+use kincal::recording::{
+    Chunk, Measurement, Memory, NominalLength, Recording, RecordingFault, Role, ToolPoint,
+};
 use kincal::units::Quantity;
 use kincal::{Error, Machine};
 use proptest::prelude::*;
@@ -237,6 +240,25 @@ fn a_file_is_read_like_the_same_bytes() {
     // The file is gone: the next pass says so.
     assert!(matches!(recording.chunks().err(), Some(Error::File { .. })));
     assert!(matches!(Recording::open(&path, &rig()), Err(Error::File { .. })));
+}
+
+#[test]
+fn where_samples_are_kept_changes_no_result() {
+    let mut text = "# measurement: position\nx[mm],c[deg],px[mm],py[mm],pz[mm]\n".to_string();
+    for i in 0..30_000 {
+        let (x, c, off) = (0.01 * f64::from(i), f64::from(i % 360), 1e-3 * f64::from(i * 7919 % 101));
+        let (sin, cos) = c.to_radians().sin_cos();
+        text += &format!("{x},{c},{},{},{}\n", x * cos + off, -x * sin, 100.0 - off);
+    }
+    let recorded = |memory: usize| [good(&text).within(&Memory::of_megabytes(memory))];
+    let found = |memory: usize| {
+        let (calibrated, fit) =
+            calibrate(&rig(), &recorded(memory), CalibrateOptions::default()).expect("a fit");
+        (calibrated.to_ron(), fit.steps, fit.loss_value.to_bits())
+    };
+    let in_memory = found(1000);
+    assert_eq!(found(0), in_memory);
+    assert_eq!(found(1), in_memory);
 }
 
 #[test]
