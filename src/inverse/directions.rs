@@ -276,7 +276,7 @@ mod tests {
         let error = [0.3, -0.2, 0.5, 0.1, -0.7, 0.4];
         for (count, columns) in [(2, 5), (3, 3), (6, 9), (1, 1), (0, 4)] {
             let directions = of(count, columns, full).directions();
-            let weakest = directions.parts.last().map_or(f64::INFINITY, |part| part.size);
+            let weakest = directions.parts.last().map_or(1.0, |part| part.size);
             let mut by_directions = vec![0.0; columns];
             directions.step(&error, &vec![0.0; columns], 0.0, &mut by_directions);
             let mut at_once = vec![0.0; columns];

@@ -31,7 +31,12 @@ const TABLE: [Row; 20] = [
     row("compare", &[], &["MACHINE.ron", "REC.csv", "--judge", "--truth"], &["--json"]),
     row("predict", &[], &["CALIBRATED.ron", "REC.csv", "BESIDE.csv"], &["--output", "--json"]),
     row("join", &["--as", "n"], &["REC.csv", "OTHER.csv"], &["--output", "--json"]),
-    row("diagnose", &[], &["MACHINE.ron", "REC.csv", "--effects"], &["--output", "--report", "--json"]),
+    row(
+        "diagnose",
+        &[],
+        &["MACHINE.ron", "REC.csv", "--effects"],
+        &["--output", "--report", "--propose", "--json"],
+    ),
     row(
         "compensate",
         &[],

@@ -94,7 +94,7 @@ fn of_recording(machine: &Machine, recording: &Recording, stages: &[Vec<f64>]) -
     let bands: Vec<f64> = ranges.iter().map(|(from, to)| DEAD_BAND * (to - from).abs()).collect();
     let mut first = FirstDirections::new(bands.clone());
     for chunk in recording.chunks()? {
-        if !first.look(&chunk?) {
+        if first.look(&chunk?) {
             break;
         }
     }
