@@ -73,8 +73,6 @@ pub use not_tried::NotTried;
 pub use outliers::{Outliers, WithoutOutliers};
 pub use parts::UnnamedPart;
 pub use propose::Proposal;
-#[cfg(feature = "cli")]
-pub(crate) use propose::library_of;
 pub use set_ups::{LeftOutRms, SetUpLeftOut};
 pub use shared::Companion;
 pub use side_branches::UnseenSideBranch;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::calibration::CalibratedMachine;
 use crate::circular::{CircularTest, circular_tests};
-use crate::diagnose::{DiagnoseOptions, Diagnosis, HeldOutPair, diagnose, library_of};
+use crate::diagnose::{DiagnoseOptions, Diagnosis, HeldOutPair, diagnose};
 use crate::effects::Library;
 use crate::feature::as_seen_in;
 use crate::identify::{calibrate, declared};
@@ -95,8 +95,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
         }
     }
     let progress = args.common.progress();
-    let mut request = DiagnoseOptions::default();
-    request.propose = args.propose.is_some();
+    let request = DiagnoseOptions { propose: args.propose.is_some(), ..DiagnoseOptions::default() };
     let (diagnosis, model, note) =
         judged(&machine, &recordings, &library, &request, (args.output.is_some(), args.force), &|text| {
             progress.say(text)
@@ -145,7 +144,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     if let Some(path) = &args.propose {
         text += &proposed(&diagnosis);
-        if let Some(library) = library_of(&diagnosis.proposals) {
+        if let Some(library) = diagnosis.proposed_library() {
             write_whole(path, |out| {
                 let _ = out.write_all(library.as_bytes());
                 Ok(())

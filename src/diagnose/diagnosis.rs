@@ -109,6 +109,20 @@ impl Diagnosis {
         let parts = self.unexplained.iter().flat_map(|unexplained| &unexplained.parts);
         !self.findings.is_empty() || parts.into_iter().any(|part| part.modelled)
     }
+
+    /// The text of a file of effects with all families that are proposed, for
+    /// [`Library::with_file`](crate::effects::Library::with_file); `None` where there are none.
+    pub fn proposed_library(&self) -> Option<String> {
+        if self.proposals.is_empty() {
+            return None;
+        }
+        let mut text = "// Proposed by kincal diagnose: in no book. Give them names, and hold them against other recordings by --effects.\n\
+                        Effects(families: [\n"
+            .to_string();
+        self.proposals.iter().for_each(|proposal| text += &proposal.ron);
+        text += "])\n";
+        Some(text)
+    }
 }
 
 /// An effect that was found, as it is put into the model.

@@ -51,19 +51,6 @@ pub struct Proposal {
     pub ron: String,
 }
 
-/// The text of a file for `--effects` with these families; `None` where there are none.
-pub(crate) fn library_of(proposals: &[Proposal]) -> Option<String> {
-    if proposals.is_empty() {
-        return None;
-    }
-    let mut text = "// Proposed by kincal diagnose: in no book. Give them names, and hold them against other recordings by --effects.\n\
-                    Effects(families: [\n"
-        .to_string();
-    proposals.iter().for_each(|proposal| text += &proposal.ron);
-    text += "])\n";
-    Some(text)
-}
-
 /// A family for each place where the model has parts without a name. `search`: with these free functions; `known`: what has a name;
 /// `names`: those that come into question for a part.
 pub(super) fn proposals(
