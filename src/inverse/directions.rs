@@ -281,8 +281,10 @@ mod tests {
             directions.step(&error, &vec![0.0; columns], 0.0, &mut by_directions);
             let mut at_once = vec![0.0; columns];
             assert!(of(count, columns, full).step_if_strong(&error, (0.0, 0.3 * weakest), &mut at_once));
+            // What `A Aᵀ` loses to rounding.
+            let rounding = 1e-14 * (directions.largest() / weakest).powi(2);
             for (a, b) in at_once.iter().zip(&by_directions) {
-                assert!((a - b).abs() < 1e-10 * norm(&by_directions), "{count} x {columns}");
+                assert!((a - b).abs() <= rounding * norm(&by_directions), "{count} x {columns}");
             }
             let mut step = vec![0.0; columns];
             let too_much = (0.0, 1.01 * weakest);
