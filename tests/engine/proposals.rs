@@ -21,8 +21,11 @@ fn path(machine: &Machine, name: &str, yields: f64, seed: u64) -> Recording {
     let [a, b, c] = [0.31, 0.23, 0.17].map(|rate| rate * random.between(0.8, 1.25));
     for k in 0..900 {
         let t = 0.1 * f64::from(k);
-        let q = [0.15 * (a * t).sin(), 0.12 * (b * t).sin(), 0.1 * (c * t).cos()];
-        let acceleration = -0.15 * a * a * (a * t).sin();
+        // Of one sine alone the acceleration is a scale error.
+        let swing = |size: f64, rate: f64| (size * (rate * t).sin(), -size * rate * rate * (rate * t).sin());
+        let (slow, fast) = (swing(0.12, a), swing(0.04, 2.7 * a));
+        let q = [slow.0 + fast.0, 0.12 * (b * t).sin(), 0.1 * (c * t).cos()];
+        let acceleration = slow.1 + fast.1;
         let mut at = q;
         at[0] += yields * acceleration;
         let p = chain.w_from_t(&at).transform(Vec3([0.0; 3])).0.map(|x| x + SIGMA * random.normal());
