@@ -63,7 +63,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     })?;
     let of = count(part.recordings() as u64, "recording", "recordings");
     let text = match part.rounds() {
-        0 => format!("what {of} say of themselves"),
+        0 => format!("heads and ranges of {of}"),
         n => format!("sums of {of}, round {n}"),
     };
     args.common.say(&format!(
