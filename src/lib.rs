@@ -22,6 +22,7 @@
 //! | room | noun |
 //! | --- | --- |
 //! | `wording` | how messages word what they count and quote |
+//! | `decimal` | numbers as text, read and written |
 //! | `few` | short columns, a value for each joint or axis |
 //! | `scalar` | [`Scalar`]: what kinematics is generic over, `f64` and dual numbers |
 //! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians |
@@ -120,6 +121,7 @@ mod cli;
 pub mod compensate;
 #[cfg(feature = "import")]
 pub mod convert;
+mod decimal;
 #[cfg(not(feature = "internals"))]
 mod demo;
 #[cfg(feature = "internals")]

@@ -76,7 +76,6 @@ pub use fault::NcFault;
 pub use modes::{Coordinate, Distance, Feed, Modes, MotionKind, Plane, Units, Why};
 pub use motion::{Motion, Step};
 pub use number::Number;
-pub(crate) use number::fixed;
 pub use program::{LONGEST_LINE, Program};
 pub use state::State;
 pub use token::{Kind, Token};

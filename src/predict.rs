@@ -1,6 +1,5 @@
 //! What a calibrated machine says an instrument would read, sample by sample.
 
-mod decimal;
 mod table;
 
 use std::io::Write;

@@ -21,7 +21,6 @@ mod arrays;
 mod call;
 mod chunk;
 mod column;
-mod decimal;
 mod entry;
 mod fault;
 mod header;

@@ -11,11 +11,12 @@ use super::style::{Style, plain};
 use super::tip_error::TipError;
 use crate::calibration::LeftOut;
 use crate::chain::Chain;
+use crate::decimal::fixed;
 use crate::few::Few;
 use crate::inverse::{Goal, Inverse, Mode, Solution};
 use crate::lie::Twist;
 use crate::machine::{JointKind, Machine};
-use crate::nc::{Block, Dialect, How, Number, Word, fixed};
+use crate::nc::{Block, Dialect, How, Number, Word};
 
 /// A number to write for an axis.
 #[derive(Clone)]

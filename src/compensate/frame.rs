@@ -117,7 +117,7 @@ impl Frame {
         let axis_words: Vec<usize> = (0..block.words().len())
             .filter(|w| {
                 let address = &block.words()[*w].address;
-                axes.iter().any(|a| *address == *a.address()) || *address == *"RPL"
+                axes.iter().any(|a| *address == *a.address()) || *address == "RPL"
             })
             .collect();
         if axis_words.iter().any(|w| block.words()[*w].value == Value::Expression) {

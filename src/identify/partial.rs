@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::noise::Noise;
 use super::plausible::{Plausibility, plausibility_of};
-use super::replay::{Answer, Few, PartForm, Replay, Request};
+use super::replay::{Answer, PartForm, Replay, Request, Spread};
 use super::source::Sources;
 use super::unknowns::{Layout, Unknowns};
 use super::{CalibrateOptions, ErrorModel, Fit, identify, normal, thin, upright};
@@ -57,7 +57,7 @@ struct Entry {
     preamble: String,
     summary: Summary,
     /// Commands and readings of a few samples, m and rad: set-ups are found from them.
-    thin: Few,
+    thin: Spread,
     answers: Vec<Answer>,
 }
 

@@ -52,14 +52,14 @@ pub(crate) struct PartForm {
     pub residuals: [(u64, f64, u64, f64); 2],
 }
 
-/// Commands and readings of a few samples, m and rad.
-pub(crate) type Few = Vec<(Vec<f64>, Vec<f64>)>;
+/// Commands and readings of a few samples spread over a recording, m and rad.
+pub(crate) type Spread = Vec<(Vec<f64>, Vec<f64>)>;
 
 /// The answers of all recordings, in the order in which they were asked for.
 #[derive(Debug)]
 pub(crate) struct Replay {
     /// By recording commands and readings of a few samples.
-    pub thin: Vec<Few>,
+    pub thin: Vec<Spread>,
     /// By recording.
     answers: Vec<Vec<Answer>>,
     next: AtomicUsize,
@@ -67,7 +67,7 @@ pub(crate) struct Replay {
 }
 
 impl Replay {
-    pub(super) fn new(thin: Vec<Few>, answers: Vec<Vec<Answer>>) -> Self {
+    pub(super) fn new(thin: Vec<Spread>, answers: Vec<Vec<Answer>>) -> Self {
         Replay { thin, answers, next: AtomicUsize::new(0), wanted: Mutex::new(None) }
     }
 

@@ -2,7 +2,7 @@
 
 use super::evaluator::{Evaluator, Moment};
 use super::noise::Noise;
-use super::replay::Few;
+use super::replay::Spread;
 use super::source::Sources;
 use super::unknowns::Unknowns;
 use crate::error::Result;
@@ -24,7 +24,7 @@ pub(crate) struct Thin {
 /// Evenly spread samples of every recording.
 pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
     if let Some(replay) = &sources.replay {
-        let of = |(source, own): (usize, &Few)| {
+        let of = |(source, own): (usize, &Spread)| {
             let thin = own.iter().cloned().map(|(q, values)| Thin { source, q, values });
             thin.collect::<Vec<_>>()
         };

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-use super::decimal;
+use crate::decimal;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::recording::{Recording, Role};
 use crate::sensor::Sensor;

@@ -6,10 +6,10 @@ use super::Recording;
 use super::RecordingFault as Fault;
 use super::chunk::Chunk;
 use super::column::{Column, Layout, Role};
-use super::decimal;
 use super::header::{Measurement, known_key};
 use super::lines::LONGEST;
 use super::text::{self, Fail, LARGEST, LARGEST_OTHER};
+use crate::decimal;
 
 /// Most samples that a chunk holds.
 const CHUNK: usize = 4096;
@@ -390,6 +390,7 @@ fn rotation_vector(q: [f64; 4]) -> std::result::Result<[f64; 3], f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decimal;
     use crate::lie::{Pose, Twist};
 
     #[test]

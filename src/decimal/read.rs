@@ -41,7 +41,7 @@ const fn fifths() -> [(u128, u32); MOST_DECIMALS + 1] {
 
 /// The number that begins at byte `at`, and the byte behind it; `None` where none does that is so plain.
 #[inline]
-pub(super) fn read(text: &[u8], at: usize) -> Option<(f64, usize)> {
+pub(crate) fn read(text: &[u8], at: usize) -> Option<(f64, usize)> {
     let negative = text.get(at) == Some(&b'-');
     let start = at + usize::from(negative);
     let (mut mantissa, point) = digits(text, start, 0);

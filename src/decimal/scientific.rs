@@ -36,7 +36,7 @@ const fn pairs() -> [[u8; 2]; 100] {
 }
 
 /// Appends a number as `{:.decimals$e}` does, with at most 15 decimals: correctly rounded, a tie to the even digit.
-pub(super) fn push(text: &mut Vec<u8>, value: f64, decimals: usize) {
+pub(crate) fn push(text: &mut Vec<u8>, value: f64, decimals: usize) {
     let Some((digits, exponent)) = rounded(value.abs(), decimals) else {
         // Memory takes everything.
         let _ = write!(text, "{value:.decimals$e}");
