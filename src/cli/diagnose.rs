@@ -167,7 +167,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
 /// What is proposed, in words.
 fn proposed(diagnosis: &Diagnosis) -> String {
     if diagnosis.proposals.is_empty() {
-        return "\nnothing is proposed: the model has no part without a name\n".into();
+        return "\nnothing is proposed: no free function is in the model\n".into();
     }
     let mut text = String::new();
     for proposal in &diagnosis.proposals {

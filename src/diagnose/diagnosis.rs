@@ -6,7 +6,7 @@ use super::approaches::StandsStill;
 use super::finding::Finding;
 use super::not_tried::NotTried;
 use super::outliers::{Outliers, WithoutOutliers};
-use super::propose::Proposal;
+use super::propose::{Proposal, library_text};
 use super::search::Search;
 use super::set_ups::SetUpLeftOut;
 use super::shared::Companion;
@@ -113,15 +113,8 @@ impl Diagnosis {
     /// The text of a file of effects with all families that are proposed, for
     /// [`Library::with_file`](crate::effects::Library::with_file); `None` where there are none.
     pub fn proposed_library(&self) -> Option<String> {
-        if self.proposals.is_empty() {
-            return None;
-        }
-        let mut text = "// Proposed by kincal diagnose: in no book. Give them names, and hold them against other recordings by --effects.\n\
-                        Effects(families: [\n"
-            .to_string();
-        self.proposals.iter().for_each(|proposal| text += &proposal.ron);
-        text += "])\n";
-        Some(text)
+        let families: String = self.proposals.iter().map(|proposal| proposal.ron.as_str()).collect();
+        (!families.is_empty()).then(|| library_text(&families))
     }
 }
 

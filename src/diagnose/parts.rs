@@ -47,7 +47,7 @@ pub struct UnnamedPart {
 /// More parts are not looked for.
 const MOST: usize = 16;
 /// So many hypotheses are held against stretches left out before it is said that nothing more is foretold.
-const TRIES: usize = 6;
+pub(super) const TRIES: usize = 6;
 
 /// Whether stretches that were left out are foretold better with term `i` of these, and whole recordings where there are several, each by
 /// more than one standard error of that.

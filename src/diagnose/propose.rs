@@ -3,7 +3,6 @@
 //! Terms of the library's own language compete at the place of a part, one after the other, beside everything else that was found. Where a
 //! few of them foretell stretches that were left out as well as the free function does, they are the law; else the function itself is.
 
-use std::fmt::Write;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -12,9 +11,11 @@ use super::finding::HeldOutPair;
 use super::folds;
 use super::held_out::Model;
 use super::names::LikelyName;
-use super::parts::{Unnamed, is_foretold};
+use super::parts::{TRIES, Unnamed, is_foretold};
 use super::search::{ENTER, ModelTerm, Search};
-use crate::effects::{Family, Library, Place, RecordingFacts};
+use crate::effects::{
+    Directions, Family, Library, LookAlike, Meaning, Output, Partner, Place, RecordingFacts, Seat, Size,
+};
 use crate::feature::Expression;
 use crate::machine::{JointKind, Machine};
 use crate::units::{ByQuantity, field_by_quantity};
@@ -23,8 +24,6 @@ field_by_quantity!(held_out_rms, free_held_out_rms);
 
 /// A law has no more terms.
 const MOST_TERMS: usize = 3;
-/// So many hypotheses are held against stretches left out before it is said that no term says more.
-const TRIES: usize = 6;
 
 /// A family that is in no book yet.
 #[non_exhaustive]
@@ -51,8 +50,8 @@ pub struct Proposal {
     pub ron: String,
 }
 
-/// A family for each place where the model has parts without a name. `search`: with these free functions; `known`: what has a name;
-/// `names`: those that come into question for a part.
+/// Families for what the model has by free functions: at each place a law, or the functions as they are. `search`: with these functions;
+/// `known`: what has a name; `names`: those that come into question for a part.
 pub(super) fn proposals(
     search: &Search,
     unnamed: &Unnamed,
@@ -63,21 +62,19 @@ pub(super) fn proposals(
     let laws = Unnamed::of(Library::primitives(), search, machine, facts);
     let rows = laws.rows(search);
     let search = &laws.search(search, &rows);
+    let draft = Draft { search, unnamed, laws: &laws, machine };
     let dyad = |term: &ModelTerm| search.candidates[term.candidate].place.dyad();
-    let mut places: Vec<Option<usize>> = Vec::new();
-    for part in parts {
-        if !places.contains(&dyad(part)) {
-            places.push(dyad(part));
-        }
-    }
-    let mut all = Vec::new();
-    for place in places.into_iter().flatten() {
+    // A part may be a family of the library, too.
+    let is_free = |term: &&ModelTerm| term.candidate >= unnamed.first;
+    let mut places: Vec<usize> = parts.iter().filter(is_free).filter_map(dyad).collect();
+    places.sort_unstable();
+    places.dedup();
+    let mut all: Vec<Proposal> = Vec::new();
+    for place in places {
         (search.progress)("putting a law together for what has no name");
         let (free, others): (Vec<ModelTerm>, Vec<ModelTerm>) =
-            parts.iter().cloned().partition(|part| dyad(part) == Some(place));
+            parts.iter().cloned().partition(|part| is_free(&part) && dyad(part) == Some(place));
         let others = [known, &others].concat();
-        let law = law(search, &laws, place, &others, &free);
-        let terms = law.as_deref().unwrap_or(&free);
         let mut looks_like: Vec<LikelyName> = Vec::new();
         for name in free.iter().flat_map(names) {
             let is_new = looks_like.iter().all(|other| other.effect != name.effect);
@@ -85,22 +82,36 @@ pub(super) fn proposals(
                 looks_like.push(name);
             }
         }
-        let name = format!("proposed_{}", all.len() + 1);
-        let libraries = [(laws.first, &laws.library), (unnamed.first, &unnamed.library), (0, library)];
-        let draft = Draft { search, terms, libraries, machine };
-        let held_out = |terms: &[ModelTerm]| held_out(search, &others, terms);
-        all.extend(draft.family(&others, &name, &looks_like).map(|ron| Proposal {
-            name,
-            at: Place::Joint(place).name(machine),
-            partner: draft.partner().map(|k| Place::Joint(k).name(machine)),
-            law: draft.features().iter().map(|(e, _)| e.to_string()).collect(),
-            free: law.is_none(),
-            held_out_rms: held_out(terms),
-            free_held_out_rms: held_out(&free),
-            ron,
-        }));
+        let law = law(search, &laws, place, &others, &free);
+        let sets = match &law {
+            Some(law) => vec![law.clone()],
+            None => draft.together(&free),
+        };
+        for (i, terms) in sets.iter().enumerate() {
+            let beside = sets.iter().enumerate().filter(|(k, _)| *k != i).flat_map(|(_, set)| set);
+            let others: Vec<ModelTerm> = others.iter().chain(beside).cloned().collect();
+            let family = draft.family(format!("proposed_{}", all.len() + 1), &others, terms, &looks_like);
+            let ron = family.to_ron();
+            debug_assert!(Library::standard().with_text("proposal", &library_text(&ron)).is_ok(), "{ron}");
+            all.push(Proposal {
+                name: family.name,
+                at: Place::Joint(place).name(machine),
+                partner: draft.partner(terms).map(|k| Place::Joint(k).name(machine)),
+                law: family.features.iter().map(Expression::to_string).collect(),
+                free: law.is_none(),
+                held_out_rms: held_out(search, &others, terms),
+                free_held_out_rms: held_out(search, &others, if law.is_none() { terms } else { &free }),
+                ron,
+            });
+        }
     }
     all
+}
+
+/// A file of effects with these families.
+pub(super) fn library_text(families: &str) -> String {
+    let heading = "// Proposed by kincal diagnose: in no book. Give them names, and hold them against other recordings by --effects.";
+    format!("{heading}\nEffects(families: [\n{families}])\n")
 }
 
 /// RMS of stretches left out, without and with these terms beside the others.
@@ -153,19 +164,17 @@ fn law(
     None
 }
 
-/// A family that is written from terms of the model.
+/// Families that are written from terms of the model.
 struct Draft<'a> {
     search: &'a Search<'a>,
-    terms: &'a [ModelTerm],
-    /// Whose families the candidates are of, each with its first candidate; the last ones first.
-    libraries: [(usize, &'a Library); 3],
+    unnamed: &'a Unnamed,
+    laws: &'a Unnamed,
     machine: &'a Machine,
 }
 
 impl Draft<'_> {
     fn library_of(&self, term: &ModelTerm) -> &Library {
-        let of = self.libraries.iter().find(|(first, _)| term.candidate >= *first);
-        of.map_or(self.libraries[2].1, |(_, library)| library)
+        if term.candidate < self.laws.first { &self.unnamed.library } else { &self.laws.library }
     }
 
     fn family_of(&self, term: &ModelTerm) -> &Family {
@@ -173,31 +182,53 @@ impl Draft<'_> {
     }
 
     /// The other joint.
-    fn partner(&self) -> Option<usize> {
-        self.terms.iter().find_map(|term| match self.search.candidates[term.candidate].place {
+    fn partner(&self, terms: &[ModelTerm]) -> Option<usize> {
+        terms.iter().find_map(|term| match self.search.candidates[term.candidate].place {
             Place::Pair(_, k) => Some(k),
             _ => None,
         })
     }
 
-    /// What it is a sum of, as far as the recordings asked for it, and the term that each is of.
-    fn features(&self) -> Vec<(&Expression, usize)> {
-        let of = |(i, term): (usize, &ModelTerm)| {
-            let candidate = &self.search.candidates[term.candidate];
-            let used = candidate.coefficients[..term.score.coefficients].iter().map(|c| c.order + 1).max();
-            let features = &self.family_of(term).features;
-            features[..used.unwrap_or(0).min(features.len())].iter().map(|e| (e, i)).collect::<Vec<_>>()
-        };
-        self.terms.iter().enumerate().flat_map(of).collect()
+    /// Terms at one place by what one family can say: one kind of motion, one other joint, every parameter once.
+    fn together(&self, terms: &[ModelTerm]) -> Vec<Vec<ModelTerm>> {
+        let mut sets: Vec<Vec<ModelTerm>> = Vec::new();
+        for term in terms {
+            let own = self.family_of(term);
+            let partner = self.partner(std::slice::from_ref(term));
+            let goes_with = |set: &[ModelTerm]| {
+                let alike = |other: &Family| other.directions == own.directions && other.pivot == own.pivot;
+                let has = |other: &Family| {
+                    own.parameters.iter().any(|p| other.parameters.iter().any(|q| q.name == p.name))
+                };
+                let families = || set.iter().map(|other| self.family_of(other));
+                let of_set = self.partner(set);
+                (of_set.is_none() || partner.is_none() || of_set == partner)
+                    && families().all(alike)
+                    && !families().any(has)
+            };
+            match sets.iter_mut().find(|set| goes_with(set)) {
+                Some(set) => set.push(term.clone()),
+                None => sets.push(vec![term.clone()]),
+            }
+        }
+        sets
     }
 
-    /// Root mean square of what it moves the joint by beside the others, m or rad.
-    fn size(&self, others: &[ModelTerm]) -> f64 {
-        let all = [others, self.terms].concat();
+    /// What a term is a sum of, as far as the recordings asked for it.
+    fn features(&self, term: &ModelTerm) -> &[Expression] {
+        let used = &self.search.candidates[term.candidate].coefficients[..term.score.coefficients];
+        let count = used.iter().map(|c| c.order + 1).max().unwrap_or(0);
+        let all = &self.family_of(term).features;
+        &all[..count.min(all.len())]
+    }
+
+    /// Root mean square of what terms move their joint by beside the others, m or rad.
+    fn size(&self, others: &[ModelTerm], terms: &[ModelTerm]) -> f64 {
+        let all = [others, terms].concat();
         let model = Model::new(self.search, &all);
         let samples = &self.search.rows.linear.samples;
         let mut sum: Vec<f64> = Vec::new();
-        for (i, term) in self.terms.iter().enumerate() {
+        for (i, term) in terms.iter().enumerate() {
             let candidate = &self.search.candidates[term.candidate];
             let solved = model.effect(self.search, &all, others.len() + i, 0.0);
             let found = solved.identified(candidate, self.library_of(term), term.score.parameters.clone());
@@ -211,90 +242,56 @@ impl Draft<'_> {
         (sum.iter().map(|x| x * x).sum::<f64>() / sum.len().max(1) as f64).sqrt()
     }
 
-    /// The family in RON; `None` where it would not be read, or its terms do not go together.
-    fn family(&self, others: &[ModelTerm], name: &str, looks_like: &[LikelyName]) -> Option<String> {
-        let first = self.family_of(self.terms.first()?);
-        let is_alike = |term: &ModelTerm| {
-            let family = self.family_of(term);
-            family.directions == first.directions && family.pivot == first.pivot
+    /// One family of terms that go together.
+    fn family(
+        &self,
+        name: String,
+        others: &[ModelTerm],
+        terms: &[ModelTerm],
+        looks_like: &[LikelyName],
+    ) -> Family {
+        let first = self.family_of(&terms[0]);
+        let place = self.search.candidates[terms[0].candidate].place.dyad().unwrap_or(0);
+        let partner = self.partner(terms);
+        let features: Vec<Expression> = terms.iter().flat_map(|term| self.features(term)).cloned().collect();
+        let law = features.iter().map(Expression::to_string).collect::<Vec<_>>().join(", ");
+        let turns =
+            |j: usize| self.machine.dyads()[j].joint.as_ref().is_some_and(|q| q.kind == JointKind::Revolute);
+        let named = |j: usize| Place::Joint(j).name(self.machine);
+        let at = partner.map_or_else(|| named(place), |k| format!("{} and {}", named(place), named(k)));
+        let is_along = first.directions == [Directions::Along];
+        // Of a pose in lengths and angles the usual size stands.
+        let size = match (is_along, turns(place)) {
+            (true, true) => Size { urad: 1e6 * self.size(others, terms), ..first.size },
+            (true, false) => Size { um: 1e6 * self.size(others, terms), ..first.size },
+            (false, _) => first.size,
         };
-        // Where motions of several kinds have no short law, the first of them is written.
-        let terms: Vec<ModelTerm> = self.terms.iter().filter(|term| is_alike(term)).cloned().collect();
-        let own = Draft { terms: &terms, ..*self };
-        let place = self.search.candidates[terms[0].candidate].place.dyad()?;
-        let kind = |j: usize| self.machine.dyads()[j].joint.as_ref().map(|joint| joint.kind);
-        let seat = |j: usize| match kind(j) {
-            Some(JointKind::Revolute) => "Revolute",
-            _ => "Prismatic",
-        };
-        let size = own.size(others);
-        let (um, urad) = match kind(place) {
-            Some(JointKind::Revolute) => (10.0, size * 1e6),
-            _ => (size * 1e6, 60.0),
-        };
-        let features = own.features();
-        let law = features.iter().map(|(e, _)| e.to_string()).collect::<Vec<_>>().join(", ");
-        let at = Place::Joint(place).name(self.machine);
-        let partner = own.partner();
-        let mut text = String::new();
-        let mut line = |inner: &str| {
-            let _ = writeln!(text, "        {inner}");
-        };
-        line(&format!("name: {name:?},"));
-        let beside =
-            partner.map_or(String::new(), |k| format!(" and {}", Place::Joint(k).name(self.machine)));
-        line(&format!(
-            "about: {:?},",
-            format!("In no book. Found at {at}{beside}: a sum of {law}, each times a number.")
-        ));
-        let pivot = if first.pivot == Default::default() { "" } else { " pivot: After," };
-        line(&format!("sits: [{}],{pivot} directions: {},", seat(place), compact(&first.directions)?));
-        if let Some(k) = partner {
-            line(&format!("partner: {},", seat(k)));
+        let peak = Output { name: "peak".into(), is: Meaning::Peak, unit: "travel".into(), shown: None };
+        let separate_by =
+            "a path on which the two foretell different errors, with this file beside the library";
+        let look_alike =
+            |name: &LikelyName| LookAlike { effect: name.effect.clone(), separate_by: separate_by.into() };
+        Family {
+            name,
+            about: format!("In no book. Found at {at}: a sum of {law}, each times a number."),
+            sits: vec![if turns(place) { Seat::Revolute } else { Seat::Prismatic }],
+            partner: partner.map(|k| if turns(k) { Partner::Revolute } else { Partner::Prismatic }),
+            features,
+            least: None,
+            parameters: terms.iter().flat_map(|term| self.family_of(term).parameters.clone()).collect(),
+            size,
+            often: 0.2,
+            coefficients: if is_along { vec![peak] } else { Vec::new() },
+            sentence: match is_along {
+                true => format!("axis {{at}} errs by up to {{peak}}, by a law that is in no book: {law}"),
+                false => format!("what carries {{at}} errs by a law that is in no book: {law}"),
+            },
+            cause: "not known: look at what moves as this law does".into(),
+            remedy: "`kincal compensate` takes it away; measure {at} on another path before a cause is named"
+                .into(),
+            look_alikes: looks_like.iter().map(look_alike).collect(),
+            source: "in no book".into(),
+            ..first.clone()
         }
-        line("features: [");
-        for (feature, _) in &features {
-            line(&format!("    {},", compact(feature)?));
-        }
-        line("],");
-        let mut parameters = Vec::new();
-        for family in terms.iter().map(|term| self.family_of(term)) {
-            for parameter in &family.parameters {
-                parameters.push(compact(parameter)?);
-            }
-        }
-        if !parameters.is_empty() {
-            line(&format!("parameters: [{}],", parameters.join(", ")));
-        }
-        line(&format!("size: (um: {um:.3}, urad: {urad:.3}), often: 0.2,"));
-        let along = matches!(first.directions.as_slice(), [crate::effects::Directions::Along]);
-        let sentence = match along {
-            true => {
-                line("coefficients: [(name: \"peak\", is: Peak, unit: \"travel\")],");
-                format!("axis {{at}} errs by up to {{peak}}, by a law that is in no book: {law}")
-            }
-            false => format!("what carries {{at}} errs by a law that is in no book: {law}"),
-        };
-        line(&format!("sentence: {sentence:?},"));
-        line("cause: \"not known: look at what moves as this law does\",");
-        line(
-            "remedy: \"`kincal compensate` takes it away; measure {at} on another path before a cause is named\",",
-        );
-        let separate = "a path on which the two foretell different errors: `kincal diagnose` with this file beside the library";
-        let alike: Vec<String> = (looks_like.iter())
-            .map(|name| format!("(effect: {:?}, separate_by: {separate:?})", name.effect))
-            .collect();
-        if !alike.is_empty() {
-            line(&format!("look_alikes: [{}],", alike.join(", ")));
-        }
-        line("source: \"in no book\",");
-        let ron = format!("    (\n{text}    ),\n");
-        let file = format!("Effects(families: [\n{ron}])\n");
-        Library::standard().with_text("proposal", &file).is_ok().then_some(ron)
     }
-}
-
-/// A value in RON on one line.
-fn compact(value: &impl Serialize) -> Option<String> {
-    ron::ser::to_string(value).ok()
 }

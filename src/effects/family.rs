@@ -1,7 +1,9 @@
 //! A family of effects as it is written in RON.
 
+use ron::ser::PrettyConfig;
 use serde::{Deserialize, Serialize};
 
+use crate::document::EXTENSIONS;
 use crate::feature::{Dimension, Expression};
 use crate::machine::JointKind;
 use crate::units::Unit;
@@ -31,13 +33,13 @@ pub struct Family {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<Partner>,
     /// Whether the deviation stands before or behind the joint.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub pivot: Pivot,
     /// Directions in se(3): each feature has one coefficient for each direction.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub directions: Vec<Directions>,
     /// What the deviation depends on.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub features: Vec<Expression>,
     /// What the name says more than: a positioning error bends, and is no name for a straight line.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -46,13 +48,13 @@ pub struct Family {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub least: Option<usize>,
     /// What features depend on beside the recording.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub parameters: Vec<ParameterForm>,
     /// For effects that are no deviation but spread: what their variance depends on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<Expression>,
     /// Size of the deviation, root mean square, that is usual on machines in use.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub size: Size,
     /// Features behind the first are usually so much smaller, as a part of that size.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -65,27 +67,27 @@ pub struct Family {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lasts: Option<f64>,
     /// Tried only where the recordings' clocks are such.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub clock: Clock,
     /// Has coefficients of its own in every set-up: it belongs to where the machine stands, not to the machine.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub each_setup: bool,
     /// Every joint has it, more or less: where it is found at one, the model may have it at the others too.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub at_every_joint: bool,
     /// Found several times at one place, with other orders, it is one error motion and one finding.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub as_one: bool,
     /// Which places of a branch come into question.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub which: Which,
     /// Tried only where the machine file states masses beyond the joint.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub needs_masses: bool,
     /// How often it is met, against 1 for backlash.
     pub often: f64,
     /// What is reported.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub coefficients: Vec<Output>,
     /// One sentence for a machinist; names in braces stand for coefficients, `{at}` for the place, `{partner}` for the other joint.
     pub sentence: String,
@@ -96,14 +98,28 @@ pub struct Family {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub remedy: String,
     /// What it may be taken for.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub look_alikes: Vec<LookAlike>,
     /// Where this is written.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub source: String,
 }
 
+/// What a file need not say.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 impl Family {
+    /// As it is written in a file of effects, a field a line.
+    pub fn to_ron(&self) -> String {
+        let config = PrettyConfig::new().depth_limit(1).indentor("    ").compact_arrays(true);
+        let options = ron::Options::default().with_default_extension(EXTENSIONS);
+        let text =
+            options.to_string_pretty(self, config).expect("a family has nothing that RON cannot write");
+        format!("    {},\n", text.replace('\n', "\n    "))
+    }
+
     /// The name that findings bear.
     pub fn told_as(&self) -> &str {
         self.form_of.as_ref().unwrap_or(&self.name)
@@ -267,7 +283,7 @@ pub struct ParameterForm {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angular: Option<(f64, f64, String)>,
     /// Range, whatever the place.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub range: Range,
     /// Which values are tried.
     pub grid: Grid,
@@ -329,12 +345,12 @@ impl Default for Size {
 #[serde(rename = "coefficient", deny_unknown_fields)]
 pub struct Output {
     /// Its name; a list of numbers is named after its members.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub name: String,
     /// What it is.
     pub is: Meaning,
     /// Its unit, which must be what the features make of it; `travel` is the joint's unit. Left out for lists.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub unit: String,
     /// Unit for people, where it is not the usual one of its kind: `ppm`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
