@@ -150,7 +150,7 @@ pub(super) fn follow(
         .iter()
         .zip(shapes.nominal.iter().cycle())
         .fold(0.0f64, |m, (y, h)| m.max((y - h).abs()));
-    if count > 0 && far > FURTHEST && path_is_level(&shapes) {
+    if far > FURTHEST && path_is_level(&shapes) {
         let what = format!("a reading is {:.3} m from what the path has", far);
         return Err(fault(what, "check the unit of the readings, and `nominal_length` in the head"));
     }

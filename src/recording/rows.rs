@@ -390,7 +390,6 @@ fn rotation_vector(q: [f64; 4]) -> std::result::Result<[f64; 3], f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::decimal;
     use crate::lie::{Pose, Twist};
 
     #[test]
