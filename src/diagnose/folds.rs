@@ -66,8 +66,9 @@ pub(super) fn gain(search: &Search, in_model: &[ModelTerm], i: usize) -> Option<
     Some(Folds::new(search, in_model)?.gain(search, i))
 }
 
-/// The same of whole recordings, which follow paths of their own; those of one motion, read by several instruments, belong together. `None`
-/// where there is one motion only.
+/// The same of whole recordings, which follow paths of their own; those of one motion, read by several instruments, belong together. Only
+/// those count that would be foretold better if the model were right: what others do not teach, they cannot foretell. `None` where there
+/// is none.
 pub(super) fn gain_elsewhere(search: &Search, in_model: &[ModelTerm], i: usize) -> Option<(f64, f64)> {
     let linear = search.rows.linear;
     let mut owner = vec![0; linear.residual.len()];
@@ -84,7 +85,7 @@ pub(super) fn gain_elsewhere(search: &Search, in_model: &[ModelTerm], i: usize) 
     if motions.len() < 2 {
         return None;
     }
-    Some(Folds::of(search, in_model, owner)?.gain(search, i))
+    Folds::of(search, in_model, owner)?.gain_where_expected(search, i)
 }
 
 /// Where each joint of a recording has been, least and greatest.
@@ -293,6 +294,8 @@ struct Folds {
     part: Vec<Part>,
     /// The fold of each row.
     owner: Vec<usize>,
+    /// The stretch of its recording that each row is in.
+    stretch: Vec<usize>,
     /// Of the whitened rows of each fold.
     grams: Vec<(DMatrix<f64>, DVector<f64>)>,
 }
@@ -344,7 +347,7 @@ impl Folds {
         let mut white = raw.clone();
         rows.whiten(&mut white);
         let grams = grams(&white, &rows.residual, &owner);
-        Some(Folds { raw, part, owner, grams })
+        Some(Folds { raw, part, owner, stretch: owners(search)?, grams })
     }
 
     /// By how much the squares of what is left out fall with effect `i`, in units of their mean without it, and the standard error of that.
@@ -352,10 +355,70 @@ impl Folds {
         self.fall(search, &self.left_out(search, &|effect| effect != i), &self.left_out(search, &|_| true))
     }
 
+    /// The same over those folds alone where it would be so if the model were right; `None` where there is none.
+    fn gain_where_expected(&self, search: &Search, i: usize) -> Option<(f64, f64)> {
+        let counts: Vec<bool> = (0..self.grams.len())
+            .map(|fold| self.expected_fall(search.overdispersion, fold, i).is_some_and(|fall| fall > 0.0))
+            .collect();
+        if !counts.contains(&true) {
+            return None;
+        }
+        let (without, with) =
+            (self.left_out(search, &|effect| effect != i), self.left_out(search, &|_| true));
+        Some(self.fall_where(search, (&without, &with), &|row| counts[self.owner[row]]))
+    }
+
+    /// By how much whitened squares of a fold would fall with effect `i` on average, were it what all folds together say, (81): what the
+    /// others do not foretell of it, and what the noise that they have makes of the coefficients.
+    fn expected_fall(&self, overdispersion: f64, fold: usize, i: usize) -> Option<f64> {
+        let width = self.part.len();
+        let sum = |takes: &dyn Fn(usize) -> bool| {
+            let start = (DMatrix::zeros(width, width), DVector::zeros(width));
+            let taken = self.grams.iter().enumerate().filter(|(other, _)| takes(*other));
+            taken.fold(start, |(gram, b), (_, own)| (gram + &own.0, b + &own.1))
+        };
+        let (all, toward) = sum(&|_| true);
+        let mut truth = with_prior(all)?.solve(&toward);
+        (0..width).filter(|c| self.part[*c] != Part::Effect(i)).for_each(|c| truth[c] = 0.0);
+        let here = &self.grams[fold].0;
+        let others = sum(&|other| other != fold).0 / overdispersion;
+        let squares = |takes: &dyn Fn(usize) -> bool| {
+            let is_lasting = |c: &usize| !self.is_own(*c, others[(*c, *c)]);
+            let (lasting, own): (Vec<usize>, Vec<usize>) =
+                (0..width).filter(|c| self.part[*c].effect().is_none_or(takes)).partition(is_lasting);
+            let factor = with_prior(others.select_rows(&lasting).select_columns(&lasting))?;
+            let mut off = truth.clone();
+            let found = factor.solve(&(others.select_rows(&lasting) * &truth));
+            lasting.iter().zip(found.iter()).for_each(|(c, x)| off[*c] -= x);
+            // What is found again here takes its part.
+            let columns = here.select_columns(&own);
+            let again = with_prior(columns.select_rows(&own))?;
+            let left = here - &columns * again.solve(&columns.transpose());
+            let spread = left.select_rows(&lasting).select_columns(&lasting) * factor.inverse();
+            Some(off.dot(&(left * &off)) + spread.trace())
+        };
+        Some(squares(&|effect| effect != i)? - squares(&|_| true)?)
+    }
+
+    /// Whether a column is found again in every fold: what effects were before anybody looked, and what no other fold knows.
+    fn is_own(&self, column: usize, of_others: f64) -> bool {
+        matches!(self.part[column], Part::InitialCondition(_)) || of_others == 0.0
+    }
+
     /// By how much squares fall from one model to another, in units of their mean under the first, and the standard error of that.
     fn fall(&self, search: &Search, without: &[f64], with: &[f64]) -> (f64, f64) {
+        self.fall_where(search, (without, with), &|_| true)
+    }
+
+    /// The same over the rows that count.
+    fn fall_where(
+        &self,
+        search: &Search,
+        (without, with): (&[f64], &[f64]),
+        counts: &dyn Fn(usize) -> bool,
+    ) -> (f64, f64) {
         let linear = search.rows.linear;
-        let used = |row: &usize| !search.rows.whitener.out[*row];
+        let used = |row: &usize| !search.rows.whitener.out[*row] && counts(*row);
         let means = ByQuantity::of(|quantity| {
             let of = |row: &usize| linear.angle[*row] == (quantity == Quantity::Angle);
             let rows: Vec<usize> = (0..without.len()).filter(used).filter(of).collect();
@@ -367,7 +430,7 @@ impl Folds {
         for (number, span) in linear.spans.iter().enumerate() {
             for row in (span.rows.0..span.rows.1).filter(used) {
                 let fall = (without[row].powi(2) - with[row].powi(2)) / mean(row);
-                *cells.entry((number, self.owner[row])).or_default() += fall;
+                *cells.entry((number, self.stretch[row])).or_default() += fall;
             }
         }
         let (count, sum) = (cells.len() as f64, cells.values().sum::<f64>());
@@ -403,9 +466,7 @@ impl Folds {
             let (gram, b) = others
                 .map(|(gram, b)| of_columns((gram, b)))
                 .fold(start, |(g, b), own| (g + own.0, b + own.1));
-            let is_own = |c: &usize| {
-                matches!(self.part[columns[*c]], Part::InitialCondition(_)) || gram[(*c, *c)] == 0.0
-            };
+            let is_own = |c: &usize| self.is_own(columns[*c], gram[(*c, *c)]);
             let (own, lasting): (Vec<usize>, Vec<usize>) = (0..width).partition(is_own);
             let mut x = with_prior(gram)?.solve(&b);
             let (gram, b) = of_columns((&self.grams[fold].0, &self.grams[fold].1));

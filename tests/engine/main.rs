@@ -30,6 +30,7 @@ mod recovery;
 mod resolvers;
 mod rivals;
 mod set_ups;
+mod shown_by_one;
 mod side_branches;
 mod standing_still;
 mod table;
