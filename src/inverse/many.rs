@@ -211,7 +211,8 @@ impl WithSimd for Many<'_> {
             for (k, (meant, found)) in meant.iter().zip(found).enumerate() {
                 let commands: Vec<f64> = to.iter().map(|column| column[k]).collect();
                 // What is no number is far as well.
-                if !(far[k] < 0.5 && gap[k] < CLOSE) || !self.inverse.is_within(&commands) {
+                let is_there = far[k] < 0.5 && gap[k] < CLOSE;
+                if !(is_there && self.inverse.is_within(&commands)) {
                     continue;
                 }
                 let row = |r: usize| [poses[3 * r][k], poses[3 * r + 1][k], poses[3 * r + 2][k]];
