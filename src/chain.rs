@@ -5,6 +5,7 @@
 
 use std::sync::OnceLock;
 
+use crate::few::Few;
 use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::machine::{Branch, Drive, JointKind, Machine};
 use crate::scalar::Scalar;
@@ -60,6 +61,11 @@ impl Chain<f64> {
     /// Where a point of frame `t` is in frame `w`, m, for a chain that is asked many times.
     pub(crate) fn tool_point(&self, q: &[f64], p_t: Vec3<f64>) -> Vec3<f64> {
         self.path().point_at(q, p_t)
+    }
+
+    /// [`Chain::tool_point`] at several rows of commands.
+    pub(crate) fn tool_points<const N: usize>(&self, q: &[Few<f64>; N], p_t: Vec3<f64>) -> [Vec3<f64>; N] {
+        self.path().points_at(q, p_t)
     }
 
     /// The way from the workpiece to the tool, laid out once.

@@ -81,6 +81,14 @@ mod envelope;
 
 mod words;
 
+// The program as it is followed, what there is to tell and what stands behind some lines of it.
+mod part;
+mod subprograms;
+
+mod ahead;
+
+mod standing;
+
 // The program as it is written.
 mod pass;
 
@@ -94,14 +102,14 @@ mod turned;
 mod curve;
 
 // What goes over a whole program.
-mod subprograms;
-
 mod passage;
 
 mod gaps;
 mod scout;
 mod trace;
 mod writer;
+
+mod batches;
 
 mod verify;
 
@@ -128,11 +136,14 @@ use crate::error::{Error, Result};
 use crate::machine::Machine;
 pub use crate::nc::Dialect;
 use crate::nc::{Program, State};
-use calibrated::model_of;
+use batches::{How, Make, ends_batch};
+use calibrated::{is_constant, model_of};
+use corrector::Solvers;
 use gaps::{Gaps, is_gap};
 use interpreter::Interpreter;
 use mark::{Mark, Origin};
 use output::put;
+use part::Part;
 use passage::{Passage, Survey, read_as};
 use scout::Scout;
 use writer::Writer;
@@ -155,8 +166,9 @@ pub fn compensate(
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
         Program::new(path, BufReader::new(file))
     };
-    let mut model = model_of(calibrated);
-    run(calibrated.machine(), &mut *model, Some(Origin::of(calibrated)), &open, setup, options, out)
+    let (mut model, make) = (model_of(calibrated), || model_of(calibrated));
+    let models = Models { own: &mut *model, more: more(calibrated, &make) };
+    run(calibrated.machine(), models, Some(Origin::of(calibrated)), &open, setup, options, out)
 }
 
 /// As [`compensate`], from a text to a text; `file` is only the name that messages use.
@@ -170,10 +182,10 @@ pub fn compensate_text(
     setup: &Setup,
     options: &CompensateOptions,
 ) -> Result<(String, Report)> {
-    let mut model = model_of(calibrated);
+    let (mut model, make) = (model_of(calibrated), || model_of(calibrated));
+    let models = Models { own: &mut *model, more: more(calibrated, &make) };
     let (machine, origin) = (calibrated.machine(), Some(Origin::of(calibrated)));
-    let (bytes, report) =
-        run_on_text(machine, &mut *model, origin, file.as_ref(), text.as_ref(), setup, options)?;
+    let (bytes, report) = run_on_text(machine, models, origin, file.as_ref(), text.as_ref(), setup, options)?;
     Ok((String::from_utf8_lossy(&bytes).into_owned(), report))
 }
 
@@ -189,12 +201,22 @@ pub fn compensate_with(
     setup: &Setup,
     options: &CompensateOptions,
 ) -> Result<(Vec<u8>, Report)> {
-    run_on_text(machine, model, None, file.as_ref(), text, setup, options)
+    run_on_text(machine, Models { own: model, more: None }, None, file.as_ref(), text, setup, options)
+}
+
+/// A model of a machine's errors, and where these have no history what makes more of it for other threads.
+struct Models<'f, 'm> {
+    own: &'f mut dyn Model,
+    more: Option<Make<'f, 'm>>,
+}
+
+fn more<'f, 'm>(calibrated: &CalibratedMachine, make: Make<'f, 'm>) -> Option<Make<'f, 'm>> {
+    is_constant(calibrated).then_some(make)
 }
 
 fn run_on_text(
     machine: &Machine,
-    model: &mut dyn Model,
+    models: Models<'_, '_>,
     origin: Option<Origin>,
     file: &Path,
     text: &[u8],
@@ -203,15 +225,15 @@ fn run_on_text(
 ) -> Result<(Vec<u8>, Report)> {
     let mut out = Vec::with_capacity(text.len() + text.len() / 4);
     let open = || Program::new(file, text);
-    let report = run(machine, model, origin, &open, setup, options, &mut out)?;
+    let report = run(machine, models, origin, &open, setup, options, &mut out)?;
     Ok((out, report))
 }
 
 /// One pass over the program behind a look for sub-programs; one more before it where directions of travel count, as far as the first
 /// motion of each axis, and one where there are sub-programs, for what their lines need.
-fn run<R: BufRead>(
+fn run<R: BufRead + Send>(
     machine: &Machine,
-    model: &mut dyn Model,
+    models: Models<'_, '_>,
     origin: Option<Origin>,
     open: &dyn Fn() -> Result<Program<R>>,
     setup: &Setup,
@@ -223,10 +245,10 @@ fn run<R: BufRead>(
         read_as(&mut program, options.dialect, options.integer_unit);
         Ok::<_, Error>(program)
     };
-    if model.is_nominal() {
+    if models.own.is_nominal() {
         return copy(machine, &mut open()?, out);
     }
-    match correct(machine, model, origin, &open, setup, options, out) {
+    match correct(machine, models, origin, &open, setup, options, out) {
         Err(error) if error.fault().is_some_and(is_gap) => {
             let all = gaps(machine, &open, setup)?.together();
             Err(match (error.place(), all) {
@@ -239,9 +261,9 @@ fn run<R: BufRead>(
 }
 
 /// The passes of [`run`] over a program that needs any.
-fn correct<R: BufRead>(
+fn correct<R: BufRead + Send>(
     machine: &Machine,
-    model: &mut dyn Model,
+    Models { own: model, more }: Models<'_, '_>,
     origin: Option<Origin>,
     open: &dyn Fn() -> Result<Program<R>>,
     setup: &Setup,
@@ -250,7 +272,7 @@ fn correct<R: BufRead>(
 ) -> Result<Report> {
     let program = open()?;
     let dialect = program.dialect();
-    let Survey { mut calls, fingerprint, foot, without_point, .. } = {
+    let Survey { mut calls, fingerprint, foot, .. } = {
         let survey = Survey::of(program)?;
         if !options.force {
             survey.refuse_marked(origin)?;
@@ -266,33 +288,50 @@ fn correct<R: BufRead>(
         while !scout.has_found() && passage.step(&mut scout, &mut std::io::sink()).unwrap_or(false) {}
         first = scout.finish();
     }
+    let solvers = Solvers::new(machine, options.mode);
     if !calls.is_empty() {
         calls.collect(true);
-        let mut writer = Writer::new(start.clone(), model, options, &first);
+        let mut writer = Writer::new(start.clone(), model, &solvers, options, &first);
         Passage::new(open()?, &mut calls).finish(&mut writer)?;
         calls.collect(false);
     }
-    let mut writer = Writer::new(start, model, options, &first);
-    let mut passage = Passage::new(open()?, &mut calls);
     let mark = origin.filter(|_| options.marked).map(|origin| Mark { program: fingerprint, origin });
-    let sign = |writer: &mut Writer, out: &mut dyn Write| match mark.filter(|_| writer.has_corrected()) {
+    let sign = |has_corrected: bool, out: &mut dyn Write| match mark.filter(|_| has_corrected) {
         Some(mark) => foot.write(&mark, dialect, out).map_err(|e| Error::file("output", e)),
         None => Ok(()),
     };
-    loop {
-        if foot.is_before(passage.passed() + 1) {
-            sign(&mut writer, out)?;
+    let mut writer = Writer::new(start, model, &solvers, options, &first);
+    let (blocks, without_point) = match more {
+        Some(make) if calls.is_empty() => {
+            let how = How { make, solvers: &solvers, options };
+            let start = writer.stop().1;
+            let sign = &mut |part: &Part, out: &mut dyn Write| sign(part.report.has_corrected(), out);
+            let all = batches::correct(open()?, start, how, &foot, out, sign)?;
+            writer = Writer::behind(all.end, model, &solvers, options);
+            writer.absorb(all.part);
+            (all.lines, all.without_point)
         }
-        if !passage.step(&mut writer, out)? {
-            break;
+        _ => {
+            let mut passage = Passage::new(open()?, &mut calls);
+            loop {
+                if ends_batch(passage.passed(), &foot) {
+                    writer.end_batch();
+                }
+                if foot.is_before(passage.passed() + 1) {
+                    sign(writer.has_corrected(), out)?;
+                }
+                if !passage.step(&mut writer, out)? {
+                    break;
+                }
+            }
+            (passage.passed(), passage.without_point())
         }
-    }
+    };
     if foot.is_last() {
-        sign(&mut writer, out)?;
+        sign(writer.has_corrected(), out)?;
     }
-    let blocks = passage.passed() as u64;
     let mut report = writer.finish();
-    report.blocks = blocks;
+    report.blocks = blocks as u64;
     if dialect == Dialect::Rs274 && options.integer_unit.is_none() {
         report.numbers_without_point = without_point;
     }

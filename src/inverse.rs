@@ -6,6 +6,7 @@
 //! small at a singular pose, and is told.
 
 mod directions;
+mod many;
 
 use std::borrow::Cow;
 
@@ -19,10 +20,18 @@ use crate::few::Few;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use directions::{Direction, Equations, MOST, norm};
+pub(crate) use many::Foreseen;
 
 /// Equations whose weakest direction is stronger than this part of the strongest are solved as they stand, to eleven digits; a Newton step
 /// needs fewer.
 const SURE: f64 = 1e-2;
+/// What is left of a goal that is reached, m and rad.
+const CLOSE: f64 = 1e-12;
+/// The volume that the unit steps of three slides span, at least.
+const SPANS: f64 = 0.3;
+/// A step that is none, and the longest that is taken at once, m and rad.
+const NO_STEP: f64 = 1e-11;
+const LONGEST: f64 = 0.5;
 
 /// What of the goal counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -158,6 +167,8 @@ pub struct Inverse<'a> {
     shifts: usize,
     /// Whether the linear joints alone bring the tip anywhere.
     by_slides: bool,
+    /// Whether linear commands turn nothing, so that the tip follows them along straight lines.
+    straight: bool,
 }
 
 /// What one Newton step sees.
@@ -214,7 +225,9 @@ impl<'a> Inverse<'a> {
             turns: 0,
             shifts: 0,
             by_slides: false,
+            straight: false,
         };
+        inverse.straight = inverse.slides_turn_nothing();
         let (all, turns, _, _) = inverse.ranks();
         let axis = { Inverse { mode: Mode::PositionAndAxis, ..inverse.clone() } }.ranks().1;
         inverse.mode = match (all, turns, axis) {
@@ -338,6 +351,58 @@ impl<'a> Inverse<'a> {
         left
     }
 
+    /// Whether no joint that turns is driven by a linear command.
+    fn slides_turn_nothing(&self) -> bool {
+        let is_slide = |c: &usize| self.machine.command_joint(*c).kind == JointKind::Prismatic;
+        self.machine.joints().all(|(j, joint)| {
+            joint.kind == JointKind::Prismatic
+                || self.machine.drive(j).is_none_or(|drive| drive.terms.iter().all(|(c, _)| !is_slide(c)))
+        })
+    }
+
+    /// The commands of [`Inverse::solve`] where the tip alone counts and linear commands alone are free: one step, since the tip follows
+    /// them along straight lines. `None` where it takes more than that, and where travel counts.
+    pub(crate) fn slide(
+        &self,
+        chain: &Chain<f64>,
+        goal: &Goal,
+        start: &[f64],
+        free: &[bool],
+    ) -> Option<Few<f64>> {
+        let is_slide = |c: usize| self.machine.command_joint(c).kind == JointKind::Prismatic;
+        let free_ones: Few<usize> = (0..free.len()).filter(|c| free[*c]).collect();
+        let is_one_step =
+            self.mode == Mode::Position && self.straight && free_ones.iter().all(|c| is_slide(*c));
+        let (true, [x, y, z]) = (is_one_step, &free_ones[..]) else { return None };
+        let look = self.look(chain, goal, start);
+        let mut q = Few::from_slice(start);
+        if look.gap_w.norm() < CLOSE {
+            return Some(q);
+        }
+        let [x_w, y_w, z_w] = [x, y, z].map(|c| look.speeds[*c].v);
+        let volume = x_w.dot(y_w.cross(z_w));
+        if volume.abs() < SPANS * x_w.norm() * y_w.norm() * z_w.norm() {
+            return None;
+        }
+        let by =
+            [y_w.cross(z_w), z_w.cross(x_w), x_w.cross(y_w)].map(|across| across.dot(look.gap_w) / volume);
+        let left = look.gap_w - x_w.times(by[0]) - y_w.times(by[1]) - z_w.times(by[2]);
+        let longest = by.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        // Steps beyond that are shortened, and ones that are no numbers go nowhere.
+        if !(left.norm() < CLOSE && longest < LONGEST) {
+            return None;
+        }
+        if longest >= NO_STEP {
+            [x, y, z].into_iter().zip(by).for_each(|(c, by)| q[*c] += by);
+        }
+        let stands = |c: &usize| {
+            let (low, high) = self.machine.travel(*c);
+            (low..=high).contains(&q[*c])
+        };
+        let is_within = !self.options.within_travel || free_ones.iter().all(stands);
+        is_within.then_some(q)
+    }
+
     /// What linear joints do.
     fn by_slides(&self, equations: Equations) -> Equations {
         equations.only(|c| self.machine.command_joint(c).kind == JointKind::Prismatic)
@@ -402,16 +467,16 @@ impl<'a> Inverse<'a> {
         while steps < self.options.steps {
             let close = self.left(&look);
             // Nothing weak can be at work once both vanish.
-            if close.0 < 1e-12 && close.1 < 1e-12 {
+            if close.0 < CLOSE && close.1 < CLOSE {
                 break;
             }
             let step = self.step(&look, &q, start, free);
             let longest = step.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-            if longest < 1e-11 {
+            if longest < NO_STEP {
                 break;
             }
             steps += 1;
-            let mut part = if longest > 0.5 { 0.5 / longest } else { 1.0 };
+            let mut part = if longest > LONGEST { LONGEST / longest } else { 1.0 };
             let merit = |look: &Look| {
                 let (position, angle) = self.left(look);
                 position.hypot(angle)

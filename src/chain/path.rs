@@ -4,10 +4,12 @@
 //! of what is measured there. Both are walks along this way, from the tool inwards and from the workpiece outwards, with one vector or one
 //! wrench at hand instead of poses: `docs/model.md` (10), (14). What is constant between two turns is multiplied out before.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::few::Few;
 use crate::lie::{Mat3, Pose, Twist, Vec3, Wrench};
 use crate::machine::JointKind;
-use crate::scalar::Scalar;
+use crate::scalar::{Lanes, MOST_LANES, Scalar};
 
 use super::Chain;
 
@@ -196,6 +198,11 @@ impl Path {
         self.point_w(p_t, &moved)
     }
 
+    /// [`Path::point_w`] at several rows of commands, m or rad, on SIMD lanes.
+    pub fn points_at<const N: usize>(&self, q: &[Few<f64>; N], p_t: Vec3<f64>) -> [Vec3<f64>; N] {
+        Arch::new().dispatch(Points { path: self, q, p_t })
+    }
+
     /// Velocity of the point `p_t` of the tool and angular velocity of the tool, both seen from `w`, by the speed of each joint; joints in the
     /// order of the way, `docs/model.md` (13). Returns the pose in `w` of frame `t` shifted to that point.
     #[inline(always)]
@@ -275,6 +282,41 @@ impl Path {
         let Some((joint, axis)) = step.joint else { return y };
         let (is_turn, moved) = (self.joints[joint].is_turn, moved[joint]);
         axis.carry(y, if step.on_tool { moved } else { moved.back(is_turn) }, is_turn)
+    }
+}
+
+/// A point at several rows of commands.
+struct Points<'a, const N: usize> {
+    path: &'a Path,
+    q: &'a [Few<f64>; N],
+    p_t: Vec3<f64>,
+}
+
+impl<const N: usize> WithSimd for Points<'_, N> {
+    type Output = [Vec3<f64>; N];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let (none, count) = (Lanes::splat(simd, 0.0), S::F64_LANES);
+        let mut q: Few<Lanes<S>> = Few::from_elem(none, self.q[0].len());
+        let mut moved: Few<Moved<Lanes<S>>> =
+            Few::from_elem(Moved::none(none), self.path.joint_count().max(1));
+        let p_t = self.p_t.lift(none);
+        let mut points = [Vec3([0.0; 3]); N];
+        let mut column = [0.0; MOST_LANES];
+        for (rows, points) in self.q.chunks(count).zip(points.chunks_mut(count)) {
+            for (c, q) in q.iter_mut().enumerate() {
+                rows.iter().zip(&mut column).for_each(|(row, x)| *x = row[c]);
+                *q = Lanes::load(simd, &column[..count]);
+            }
+            self.path.go_to(&q, &mut moved);
+            let p_w = self.path.point_w(p_t, &moved);
+            for (i, x) in p_w.0.into_iter().enumerate() {
+                x.store(&mut column[..count]);
+                points.iter_mut().zip(&column).for_each(|(point, x)| point.0[i] = *x);
+            }
+        }
+        points
     }
 }
 

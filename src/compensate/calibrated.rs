@@ -17,3 +17,9 @@ pub(super) fn model_of(calibrated: &CalibratedMachine) -> Box<dyn Model + '_> {
         None => Box::new(Constant::new(calibrated)),
     }
 }
+
+/// Whether the errors of a machine have no history: they depend on where it stands alone.
+pub(super) fn is_constant(calibrated: &CalibratedMachine) -> bool {
+    let varying = &calibrated.variation().varying;
+    varying.terms.is_empty() && varying.directions.is_none()
+}

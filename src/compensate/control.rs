@@ -65,6 +65,17 @@ impl<'a> Control<'a> {
         control
     }
 
+    /// Whether both have the same in force, of one machine and set-up.
+    pub fn is_as(&self, other: &Control) -> bool {
+        self.units == other.units
+            && self.tcp == other.tcp
+            && self.frame == other.frame
+            && self.offset == other.offset
+            && (self.length, self.tip_length) == (other.length, other.tip_length)
+            && (self.normal, self.length_axis) == (other.normal, other.length_axis)
+            && self.w_from_program == other.w_from_program
+    }
+
     /// What the program and its control have agreed on beforehand.
     pub fn setup(&self) -> &'a Setup {
         self.setup
@@ -273,7 +284,11 @@ impl<'a> Control<'a> {
         }
         let t_from_tip = self.t_from_tip(self.length);
         let w_from_tip = Pose::translation(self.w_from_program.transform(p));
-        let solution = self.inverse.solve(&self.nominal, &Goal { t_from_tip, w_from_tip }, &q, &free);
+        let goal = Goal { t_from_tip, w_from_tip };
+        if let Some(q) = self.inverse.slide(&self.nominal, &goal, &q, &free) {
+            return Some(q);
+        }
+        let solution = self.inverse.solve(&self.nominal, &goal, &q, &free);
         (solution.position_left_m < 1e-9).then(|| solution.commands.into())
     }
 
@@ -315,6 +330,23 @@ impl<'a> Control<'a> {
             return Some(q);
         }
         self.joints(&mix(a.program(), b.program()), &q)
+    }
+
+    /// Where the tip is meant to be in frame `w` at some parts of a straight move, m.
+    pub fn tips_between<const N: usize>(
+        &self,
+        a: &Position,
+        b: &Position,
+        parts: [f64; N],
+    ) -> [Vec3<f64>; N] {
+        let mix = |a: &[f64], b: &[f64], s: f64| -> Few<f64> {
+            a.iter().zip(b).map(|(a, b)| a + (b - a) * s).collect()
+        };
+        if self.tcp {
+            let place = self.w_from_program * self.frame.pose();
+            return parts.map(|s| place.transform(self.triple(&mix(a.program(), b.program(), s))));
+        }
+        self.nominal.tool_points(&parts.map(|s| mix(a.q(), b.q(), s)), self.tip().translation)
     }
 
     /// Calls a position by the coordinates in force; the machine has not moved.

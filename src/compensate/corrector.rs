@@ -2,6 +2,7 @@
 //! `docs/compensate.md` (C9) to (C11).
 
 use std::borrow::Cow;
+use std::collections::VecDeque;
 
 use super::control::Control;
 use super::interpreter::Interpreter;
@@ -11,10 +12,10 @@ use super::style::{Style, plain};
 use super::tip_error::TipError;
 use crate::calibration::LeftOut;
 use crate::chain::Chain;
-use crate::decimal::fixed;
+use crate::decimal::{self, fixed};
 use crate::few::Few;
-use crate::inverse::{Goal, Inverse, Mode, Solution};
-use crate::lie::Twist;
+use crate::inverse::{Foreseen, Goal, Inverse, Mode, Solution};
+use crate::lie::{Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::nc::{Block, Dialect, How, Number, Word};
 
@@ -79,36 +80,81 @@ impl Correction {
 }
 
 /// A position corrected, before rounding.
-struct Corrected {
+#[derive(Clone, PartialEq)]
+pub(super) struct Corrected {
     meant: Few<f64>,
     sent: Few<f64>,
     /// The piece that it belongs to.
     piece: usize,
 }
 
+/// Positions that may have been foreseen and are left out.
+const FORESEEN: usize = 4;
+
 /// Each time the correction is found anew, what is still wrong with it shrinks by the slope of the errors, which is a few percent for the
 /// steepest waves of gears; twice makes nothing of a micrometre.
 const SETTLING: usize = 2;
 
-/// A machine with its errors, and the inverse of it.
-pub(super) struct Corrector<'a> {
+/// What finds joint commands.
+#[derive(Clone)]
+pub(super) struct Solvers<'a> {
     machine: &'a Machine,
-    model: &'a mut dyn Model,
     inverse: Inverse<'a>,
     /// For the linear joints alone.
     slides: Inverse<'a>,
-    last: Option<Corrected>,
 }
 
-impl<'a> Corrector<'a> {
-    /// `mode`: what counts, where it is not what the machine has joints for. `first`: direction of the first motion of each
-    /// command, 0 where that is not known.
-    pub fn new(machine: &'a Machine, model: &'a mut dyn Model, mode: Option<Mode>, first: &[i8]) -> Self {
+impl<'a> Solvers<'a> {
+    /// `mode`: what counts, where it is not what the machine has joints for.
+    pub fn new(machine: &'a Machine, mode: Option<Mode>) -> Self {
         let inverse = Inverse::new(machine);
         let inverse = mode.map_or(inverse.clone(), |mode| inverse.with_mode(mode));
         let slides = inverse.with_mode(Mode::Position);
-        model.restart(first);
-        Corrector { machine, model, inverse, slides, last: None }
+        Solvers { machine, inverse, slides }
+    }
+}
+
+/// A machine with its errors, and the inverse of it.
+pub(super) struct Corrector<'a, 'm> {
+    machine: &'a Machine,
+    model: &'m mut dyn Model,
+    solvers: &'m Solvers<'a>,
+    last: Option<Corrected>,
+    /// Positions that lie ahead, looked at beforehand, in the order in which they come.
+    foreseen: VecDeque<Foreseen>,
+}
+
+impl<'a, 'm> Corrector<'a, 'm> {
+    /// Behind a position that was corrected, if one was; the model stands there.
+    pub fn behind(last: Option<Corrected>, model: &'m mut dyn Model, solvers: &'m Solvers<'a>) -> Self {
+        Corrector { machine: solvers.machine, model, solvers, last, foreseen: VecDeque::new() }
+    }
+
+    /// Looks at positions that lie ahead, as the program means them; whether a position is one of them shows when it comes.
+    pub fn foresee(&mut self, control: &Control, meant: &[Few<f64>]) {
+        let Some(first) = meant.first() else { return };
+        let found = match self.model.chain_at(first) {
+            Cow::Borrowed(chain) => {
+                self.solvers.inverse.foresee((control.nominal(), chain), control.tip(), meant)
+            }
+            // Errors that bend from place to place are looked at there.
+            Cow::Owned(_) => return,
+        };
+        self.foreseen = found.into_iter().flatten().collect();
+    }
+
+    /// A position that was foreseen, if this is one.
+    fn foreseen(&mut self, control: &Control, meant: &[f64], free: &[bool]) -> Option<Foreseen> {
+        let is_same = |a: &[f64]| a.iter().zip(meant).all(|(a, b)| a.to_bits() == b.to_bits());
+        let at = self.foreseen.iter().take(FORESEEN).position(|next| is_same(&next.meant))?;
+        self.foreseen.drain(..at);
+        let next = self.foreseen.front().filter(|next| next.goal.t_from_tip == control.tip())?;
+        free.iter().all(|free| *free).then(|| next.clone())
+    }
+
+    /// The position that was corrected last.
+    pub fn into_last(self) -> Option<Corrected> {
+        self.last
     }
 
     pub fn machine(&self) -> &'a Machine {
@@ -117,7 +163,7 @@ impl<'a> Corrector<'a> {
 
     /// The machine's errors where it stands.
     pub fn model(&self) -> &dyn Model {
-        self.model
+        &*self.model
     }
 
     /// Whether a position has been corrected since the machine was told to go on.
@@ -148,6 +194,19 @@ impl<'a> Corrector<'a> {
         (there - control.nominal().tool_point(meant, tip_t)).norm()
     }
 
+    /// Where the tip is by the model in frame `w`, m, where the joints are sent to each of `sent`.
+    pub fn tips_w<const N: usize>(&self, control: &Control, sent: &[Few<f64>; N]) -> [Vec3<f64>; N] {
+        let tip_t = control.tip().translation;
+        let chains: [_; N] = std::array::from_fn(|k| self.model.chain_at(&sent[k]));
+        let chain = self.model.chain();
+        let is_same =
+            |other: &Cow<Chain<f64>>| matches!(other, Cow::Borrowed(other) if std::ptr::eq(*other, chain));
+        if chains.iter().all(is_same) {
+            return chain.tool_points(sent, tip_t);
+        }
+        std::array::from_fn(|k| chains[k].tool_point(&sent[k], tip_t))
+    }
+
     /// What the model says is wrong where the joints are sent to `sent`.
     pub fn error(&self, goal: &Goal, sent: &[f64]) -> TipError {
         TipError::between(self.model.chain_at(sent).tool_pose(sent) * goal.t_from_tip, goal.w_from_tip)
@@ -157,14 +216,14 @@ impl<'a> Corrector<'a> {
     /// belong to the position that is sent, which the correction itself moves a little.
     fn settle(&self, goal: &Goal, meant: &[f64], free: &[bool]) -> (Cow<'_, Chain<f64>>, Solution) {
         let mut chain = self.model.chain_at(meant);
-        let mut solution = self.inverse.solve(&chain, goal, meant, free);
+        let mut solution = self.solvers.inverse.solve(&chain, goal, meant, free);
         for _ in 0..SETTLING {
             let there = self.model.chain_at(&solution.commands);
             if matches!(there, Cow::Borrowed(_)) {
                 break;
             }
             chain = there;
-            solution = self.inverse.solve(&chain, goal, meant, free);
+            solution = self.solvers.inverse.solve(&chain, goal, meant, free);
         }
         (chain, solution)
     }
@@ -182,7 +241,7 @@ impl<'a> Corrector<'a> {
         meant: &[f64],
         free: &[bool],
     ) -> Solution {
-        self.inverse.solve(chain, &program.control().goal(meant), meant, free)
+        self.solvers.inverse.solve(chain, &program.control().goal(meant), meant, free)
     }
 
     /// The joint commands that bring tip and axis of the actual machine where the program means them, and the
@@ -197,8 +256,15 @@ impl<'a> Corrector<'a> {
     ) -> Correction {
         let control = program.control();
         let free = program.free();
-        let goal = control.goal(q);
-        let (chain, solution) = self.settle(&goal, q, &free);
+        let foreseen = self.foreseen(control, q, &free);
+        let (goal, chain, solution) = match foreseen {
+            Some(Foreseen { goal, solution, .. }) => (goal, self.model.chain_at(q), solution),
+            None => {
+                let goal = control.goal(q);
+                let (chain, solution) = self.settle(&goal, q, &free);
+                (goal, chain, solution)
+            }
+        };
         let mut exact: Few<f64> = Few::from_slice(&solution.commands);
         let (slip, mut numbers) = (control.slip(), Vec::new());
         let mut coordinates = Few::from_slice(program.written().program());
@@ -217,7 +283,10 @@ impl<'a> Corrector<'a> {
             if let Some(there) = control.joints(&rounded, &exact) {
                 let slides: Few<bool> = (0..free.len()).map(|c| free[c] && self.is_prismatic(c)).collect();
                 if slides.iter().filter(|s| **s).count() == 3 {
-                    exact = self.slides.solve(&chain, &goal, &there, &slides).commands.into();
+                    let slid = self.solvers.slides.slide(&chain, &goal, &there, &slides);
+                    exact = slid.unwrap_or_else(|| {
+                        self.solvers.slides.solve(&chain, &goal, &there, &slides).commands.into()
+                    });
                 } else {
                     exact = there;
                 }
@@ -325,7 +394,10 @@ fn number(
             (fixed(value, places), Dialect::Rs274)
         }
     };
-    let Some(written) = Number::parse(text.as_bytes(), dialect) else { return now };
+    let plain = decimal::read(text.as_bytes(), 0).filter(|(_, end)| *end == text.len());
+    let written =
+        plain.map(|(value, _)| value).or_else(|| Some(Number::parse(text.as_bytes(), dialect)?.value));
+    let Some(written) = written else { return now };
     numbers.push(AxisNumber { axis, text });
-    stands(written.value)
+    stands(written)
 }

@@ -7,7 +7,7 @@ use crate::lie::{Pose, Vec3};
 use crate::nc::{Block, Dialect, Kind, Plane, Token, Units, Value};
 
 /// How coordinates of a block lie in the frame of the work offset.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Frame {
     /// Of X, Y, Z, m.
     pose: Pose<f64>,

@@ -98,6 +98,23 @@ impl<'a> Interpreter<'a> {
         self.rename();
     }
 
+    /// Whether both stand alike, to the last bit where they are: of one machine and set-up.
+    pub fn is_as(&self, other: &Interpreter) -> bool {
+        self.meant.is_as(&other.meant)
+            && self.written.is_as(&other.written)
+            && self.control.is_as(&other.control)
+            && self.state == other.state
+            && self.places == other.places
+            && self.ways == other.ways
+            && self.tool == other.tool
+            // What is missing follows from the tool and the offset.
+            && self.missing().count() == other.missing().count()
+            && self.modal_cycle == other.modal_cycle
+            && self.absolute_centre == other.absolute_centre
+            && self.feed == other.feed
+            && self.ended == other.ended
+    }
+
     /// What moves need of the set-up and it does not say.
     pub fn missing(&self) -> impl Iterator<Item = &CompensateFault> {
         self.offset_fault.iter().chain(&self.tool_fault)
@@ -110,6 +127,10 @@ impl<'a> Interpreter<'a> {
     pub fn block(&mut self, block: &Block) -> Result<Vec<Event>> {
         let mut events = Vec::new();
         if self.ended {
+            return Ok(events);
+        }
+        if block.is_plain_motion() && !self.state.modes().modal_call {
+            events.extend(self.plain_motion(block)?);
             return Ok(events);
         }
         if has_g(block, 90.1) || has_g(block, 91.1) {
@@ -166,6 +187,19 @@ impl<'a> Interpreter<'a> {
         }
         self.ended = ends(block);
         Ok(events)
+    }
+
+    /// The short way through [`Interpreter::block`] for a block that can change no more than where axes are, the motion and the feed.
+    fn plain_motion(&mut self, block: &Block) -> Result<Option<Event>> {
+        let step = self.state.apply(block)?;
+        if let Some(word) = block.words().iter().find(|w| w.address == "F") {
+            self.feed = word.number().map(|feed| (feed, block.text(&word.value_span)));
+        }
+        if let Some(piece) = &step.unfollowed {
+            let text = block.text(&piece.span).chars().take(60).collect();
+            return refuse(block, piece.span.start, CompensateFault::NotFollowed { what: piece.what, text });
+        }
+        step.motion.map(|motion| self.motion(block, motion)).transpose()
     }
 
     /// M codes, tools and positions beside the words of the block, which send axes elsewhere.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::io::Write;
 
-use super::corrector::{Correction, Corrector};
+use super::corrector::{Correction, Corrector, Solvers};
 use super::envelope::{Envelope, expected};
 use super::event::Event;
 use super::fault::CompensateFault;
@@ -12,11 +12,13 @@ use super::model::Model;
 use super::motion_word::{first_of, motion_word};
 use super::options::{CompensateOptions, UnknownAxes};
 use super::output::put;
+use super::part::Part;
 use super::position::Position;
 use super::refusal::refuse;
 use super::report::{
     Beyond, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, UnseenPiece, Worst,
 };
+use super::standing::Standing;
 use super::style::{Style, plain};
 use super::tip_error::TipError;
 use super::unseen::UnseenSums;
@@ -32,54 +34,110 @@ use crate::nc::{Block, Motion, MotionKind, Number};
 const NO_WAY: f64 = 1e-9;
 
 /// A program being corrected.
-pub(super) struct Pass<'a> {
+pub(super) struct Pass<'a, 'm> {
     program: Interpreter<'a>,
-    corrector: Corrector<'a>,
-    options: &'a CompensateOptions,
+    corrector: Corrector<'a, 'm>,
+    options: &'m CompensateOptions,
     style: Style,
     /// Motion in force by what has been written.
     written_motion: Option<MotionKind>,
-    report: Report,
+    /// What there is to tell of this batch, and of those before it.
+    told: Part,
+    before: Part,
     envelope: Envelope,
-    unseen: UnseenSums,
     /// The last line that went beyond what the calibration has seen.
     extrapolated: usize,
 }
 
-impl<'a> Pass<'a> {
+impl<'a, 'm> Pass<'a, 'm> {
     /// From the start of `program`. `first`: direction of the first motion of each command, 0 where that is not known.
     pub fn new(
         mut program: Interpreter<'a>,
-        model: &'a mut dyn Model,
-        options: &'a CompensateOptions,
+        model: &'m mut dyn Model,
+        solvers: &'m Solvers<'a>,
+        options: &'m CompensateOptions,
         first: &[i8],
     ) -> Self {
-        let machine = program.control().machine();
-        let mut corrector = Corrector::new(machine, model, options.mode, first);
+        model.restart(first);
         let ways = program.take_way();
-        corrector.advance(program.meant().q(), &ways);
+        let style = Style::new(options.decimals);
+        let start = Standing { program, style, written_motion: None, last: None };
+        Pass::told(start, &ways, model, solvers, options)
+    }
+
+    /// Behind some lines, for a model without history.
+    pub fn behind(
+        start: Standing<'a>,
+        model: &'m mut dyn Model,
+        solvers: &'m Solvers<'a>,
+        options: &'m CompensateOptions,
+    ) -> Self {
+        let ways = start.program.open_ways();
+        Pass::told(start, &ways, model, solvers, options)
+    }
+
+    fn told(
+        start: Standing<'a>,
+        ways: &[bool],
+        model: &'m mut dyn Model,
+        solvers: &'m Solvers<'a>,
+        options: &'m CompensateOptions,
+    ) -> Self {
+        let Standing { program, style, written_motion, last } = start;
+        let machine = program.control().machine();
+        let mut corrector = Corrector::behind(last, model, solvers);
+        corrector.advance(program.meant().q(), ways);
+        let report = Report { machine: machine.name().to_string(), ..Report::default() };
         Pass {
             program,
             corrector,
             options,
-            style: Style::new(options.decimals),
-            written_motion: None,
-            report: Report { machine: machine.name().to_string(), ..Report::default() },
+            style,
+            written_motion,
+            told: Part { report, unseen: UnseenSums::default() },
+            before: Part::default(),
             envelope: Envelope::new(machine, options.max_correction),
-            unseen: UnseenSums::default(),
             extrapolated: 0,
         }
+    }
+
+    /// What stands behind the last line, and what there is to tell since this or [`Pass::end_batch`] began.
+    pub fn stop(self) -> (Part, Standing<'a>) {
+        let Pass { program, style, written_motion, corrector, .. } = self;
+        (self.told, Standing { program, style, written_motion, last: corrector.into_last() })
+    }
+
+    /// Sums over moves begin anew here, so that they are the same however many batches are corrected side by side.
+    pub fn end_batch(&mut self) {
+        let report = Report { machine: self.told.report.machine.clone(), ..Report::default() };
+        let told = std::mem::replace(&mut self.told, Part { report, unseen: UnseenSums::default() });
+        self.before.absorb(told);
+    }
+
+    /// Looks at positions that lie ahead, as [`Corrector::foresee`].
+    pub fn foresee(&mut self, meant: &[Few<f64>]) {
+        self.corrector.foresee(self.program.control(), meant);
+    }
+
+    /// Takes up what there is to tell of the lines before.
+    pub fn absorb(&mut self, before: Part) {
+        self.before.absorb(before);
+    }
+
+    /// Whether anything is written otherwise than it was.
+    pub fn has_corrected(&self) -> bool {
+        self.before.report.has_corrected() || self.told.report.has_corrected()
     }
 
     pub fn program(&self) -> &Interpreter<'a> {
         &self.program
     }
 
-    pub fn corrector(&self) -> &Corrector<'a> {
+    pub fn corrector(&self) -> &Corrector<'a, 'm> {
         &self.corrector
     }
 
-    pub fn options(&self) -> &'a CompensateOptions {
+    pub fn options(&self) -> &'m CompensateOptions {
         self.options
     }
 
@@ -89,7 +147,7 @@ impl<'a> Pass<'a> {
 
     /// What there is to tell so far.
     pub fn report(&mut self) -> &mut Report {
-        &mut self.report
+        &mut self.told.report
     }
 
     /// Follows a block up to its move under program coordinates, which is the caller's; without one the block is written as it is.
@@ -102,15 +160,15 @@ impl<'a> Pass<'a> {
             match event {
                 Event::Units => self.style.forget_lengths(),
                 Event::Preset { words } => self.put_preset(block, &words)?,
-                Event::Drilled => self.report.cycles += 1,
+                Event::Drilled => self.told.report.cycles += 1,
                 Event::Sent { q, ways, kind } => {
                     self.corrector.advance(&q, &ways);
                     self.written_motion = kind.or(self.written_motion);
-                    self.report.machine_moves += 1;
+                    self.told.report.machine_moves += 1;
                 }
                 // The last thing that a block makes happen.
                 Event::Move { motion, target, drills } => {
-                    self.report.moves += 1;
+                    self.told.report.moves += 1;
                     self.style.read(block, &motion, self.program.control(), self.program.dialect());
                     return Ok(Some((motion, target, drills)));
                 }
@@ -134,7 +192,7 @@ impl<'a> Pass<'a> {
                 let written = Number::parse(text.as_bytes(), dialect).map_or(number.value + by, |n| n.value);
                 left = number.value + by - written;
                 block.replace(word, &self.style.pointed(&text))?;
-                self.report.corrected_words += 1;
+                self.told.report.corrected_words += 1;
             }
             let left = control.si(axis, left);
             self.program.set_slip(axis, left);
@@ -156,7 +214,7 @@ impl<'a> Pass<'a> {
         for c in unknown {
             let joint = control.machine().commands()[*c].clone();
             let side = model.directions()[*c];
-            self.report.unknown_ways.push(UnknownWay { line, joint, side });
+            self.told.report.unknown_ways.push(UnknownWay { line, joint, side });
         }
     }
 
@@ -171,15 +229,15 @@ impl<'a> Pass<'a> {
             self.go_beyond(block, q)?;
         }
         if let Some(piece) = self.corrector.model().unseen_piece() {
-            self.report.unseen_directions.push_once(UnseenPiece { line, piece }, line);
+            self.told.report.unseen_directions.push_once(UnseenPiece { line, piece }, line);
         }
         if let Some(step) = self.corrector.step(&self.program) {
             let (step_m, step_rad) = (step.m(), step.rad());
-            self.report.largest_reversal_m.take(step_m, line);
+            self.told.report.largest_reversal_m.take(step_m, line);
             if self.options.max_step.is_some_and(|most| step_m > most) {
-                self.report.large_steps.push(Reversal { line, step_m, step_rad });
+                self.told.report.large_steps.push(Reversal { line, step_m, step_rad });
             }
-            self.report.reversals.push(Reversal { line, step_m, step_rad });
+            self.told.report.reversals.push(Reversal { line, step_m, step_rad });
         }
         Ok(())
     }
@@ -190,7 +248,7 @@ impl<'a> Pass<'a> {
         let line = block.line();
         if self.extrapolated != line {
             self.extrapolated = line;
-            self.report.extrapolated_moves += 1;
+            self.told.report.extrapolated_moves += 1;
         }
         let (model, control) = (self.corrector.model(), self.program.control());
         let nearest = model.nearest_seen(q);
@@ -203,11 +261,11 @@ impl<'a> Pass<'a> {
                 continue;
             }
             let joint = control.machine().commands()[c].clone();
-            match self.report.extrapolated_joints.iter_mut().find(|beyond| beyond.joint == joint) {
+            match self.told.report.extrapolated_joints.iter_mut().find(|beyond| beyond.joint == joint) {
                 Some(beyond) => beyond.by.take(by, line),
                 None => {
                     let by = Worst { value: by, line };
-                    self.report.extrapolated_joints.push(Beyond { joint: joint.clone(), rotary, by });
+                    self.told.report.extrapolated_joints.push(Beyond { joint: joint.clone(), rotary, by });
                 }
             }
             joints.push(joint);
@@ -246,7 +304,7 @@ impl<'a> Pass<'a> {
             return refuse(block, 0, CompensateFault::UnknownPlace { axes });
         }
         let line = block.line();
-        self.report.unknown_places.push_once(UnknownPlace { line, axes }, line);
+        self.told.report.unknown_places.push_once(UnknownPlace { line, axes }, line);
         Ok(())
     }
 
@@ -280,13 +338,13 @@ impl<'a> Pass<'a> {
             }
             Outcome::Singular { lost_w } => {
                 let lost_w = lost_w.to_array();
-                self.report.singular.push_once(SingularBlock { line, lost_w, left_rad }, line);
+                self.told.report.singular.push_once(SingularBlock { line, lost_w, left_rad }, line);
             }
             Outcome::Unreachable
                 if solution.position_left_m > 1e-9 && self.program.free().iter().all(|f| *f) =>
             {
                 let left_m = solution.position_left_m;
-                self.report.unreachable.push_once(Unreached { line, left_m, left_rad }, line);
+                self.told.report.unreachable.push_once(Unreached { line, left_m, left_rad }, line);
             }
             _ => {}
         }
@@ -296,7 +354,7 @@ impl<'a> Pass<'a> {
     /// Puts the numbers of a correction into a block.
     pub fn put_words(&mut self, block: &mut Block, motion: &Motion, correction: &Correction) -> Result<()> {
         let habits = (&self.style, self.program.control());
-        words::put_into(block, &motion.words, correction.numbers(), habits, &mut self.report)
+        words::put_into(block, &motion.words, correction.numbers(), habits, &mut self.told.report)
     }
 
     /// Writes the block's motion word where what was written before has put another one into force.
@@ -330,17 +388,17 @@ impl<'a> Pass<'a> {
         // Where an axis stands at a place of the machine, the tip is nowhere that matters.
         if !self.program.places().any_parked() {
             let left = self.corrector.error(&goal, written.q());
-            self.report.largest_left_m.take(left.m(), line);
-            self.report.largest_left_rad.take(left.rad(), line);
+            self.told.report.largest_left_m.take(left.m(), line);
+            self.told.report.largest_left_rad.take(left.rad(), line);
         }
         let correction = TipError::between(control.tip_pose(written.q()), goal.w_from_tip);
         if let Some(bound_m) = self.envelope.exceeded(control, meant.q(), correction.m()) {
             return refuse(block, 0, CompensateFault::TooFar { by_m: correction.m(), bound_m });
         }
-        self.report.largest_correction_m.take(correction.m(), line);
-        self.report.largest_correction_rad.take(correction.rad(), line);
+        self.told.report.largest_correction_m.take(correction.m(), line);
+        self.told.report.largest_correction_rad.take(correction.rad(), line);
         if let Some(patterns) = self.corrector.unseen().filter(|p| !p.is_empty()) {
-            self.unseen.add(control, patterns, written.q());
+            self.told.unseen.add(control, patterns, written.q());
         }
         self.program.arrive(meant, written);
         Ok(())
@@ -353,10 +411,11 @@ impl<'a> Pass<'a> {
     }
 
     /// The report of what was followed.
-    pub fn finish(self) -> Report {
-        let mut report = self.report;
+    pub fn finish(mut self) -> Report {
+        self.end_batch();
+        let Part { mut report, unseen } = self.before;
         let machine = self.corrector.machine();
-        report.unseen = self.corrector.unseen().map(|patterns| self.unseen.report(machine, patterns));
+        report.unseen = self.corrector.unseen().map(|patterns| unseen.report(machine, patterns));
         let (left_out, held) = self.corrector.reservations();
         (report.left_out, report.held) = (left_out.to_vec(), held.to_vec());
         if report.moves > 0 {

@@ -15,8 +15,6 @@ pub(super) struct Survey {
     /// Its sub-programs.
     pub calls: SubPrograms,
     pub fingerprint: Fingerprint,
-    /// Numbers of axes that are not zero and have no point.
-    pub without_point: u64,
     /// The mark that it bears, with its block.
     pub mark: Option<(Block, Mark)>,
     /// Where a mark may be put.
@@ -32,16 +30,21 @@ impl Survey {
         let (dialect, mut bounds) = (program.dialect(), Bounds::default());
         let mut survey = Survey {
             calls: SubPrograms::counting(program.increments()),
-            without_point: 0,
             fingerprint: Fingerprint::default(),
             mark: None,
             foot: Foot::default(),
         };
-        while let Some(block) = program.next_block()? {
-            survey.fingerprint.take(block.bytes());
-            if program.increments().is_empty() {
-                survey.without_point += block.words().iter().filter(|word| is_ambiguous(word)).count() as u64;
-            } else if dialect != Dialect::Rs274 || block.words().iter().any(is_inch) {
+        while let Some(bytes) = program.next_line()? {
+            survey.fingerprint.take(&bytes);
+            survey.foot.look(program.line(), &bytes);
+            // Most lines are motions alone, and need no closer look.
+            if program.increments().is_empty() && !bounds.is_inside() && !may_tell(&bytes) {
+                continue;
+            }
+            let block = program.block_of(bytes);
+            if !program.increments().is_empty()
+                && (dialect != Dialect::Rs274 || block.words().iter().any(is_inch))
+            {
                 let what = if dialect == Dialect::Rs274 {
                     "in inches they do not"
                 } else {
@@ -49,7 +52,6 @@ impl Survey {
                 };
                 return refuse(&block, 0, CompensateFault::Increments { what });
             }
-            survey.foot.look(block.line(), block.bytes());
             if let Some(name) = bounds.of(&block, dialect) {
                 survey.calls.add(&name, &block);
             }
@@ -92,6 +94,11 @@ impl Survey {
     }
 }
 
+/// Whether a line may begin, end, or stop before a sub-program, or bear a mark.
+fn may_tell(bytes: &[u8]) -> bool {
+    bytes.iter().fold(false, |found, b| found | matches!(b, b'O' | b'o' | b':' | b'M' | b'm' | b'K'))
+}
+
 /// Addresses of RS-274 whose numbers may count least increments.
 const COUNTED: &[&str] = &["X", "Y", "Z", "A", "B", "C", "U", "V", "W", "I", "J", "K", "R", "Q"];
 
@@ -114,6 +121,11 @@ fn is_ambiguous(word: &Word) -> bool {
         && matches!(word.value, Value::Number(number) if !number.has_point && number.value != 0.0)
 }
 
+/// Numbers of axes in a block that are not zero and have no point.
+pub(super) fn without_point(block: &Block) -> u64 {
+    block.words().iter().filter(|word| is_ambiguous(word)).count() as u64
+}
+
 fn is_inch(word: &Word) -> bool {
     word.address == "G" && word.number() == Some(20.0)
 }
@@ -126,18 +138,25 @@ pub(super) struct Passage<'c, R> {
     dialect: Dialect,
     /// Lines passed.
     passed: usize,
+    /// Numbers of axes that are not zero and have no point.
+    without_point: u64,
 }
 
 impl<'c, R: BufRead> Passage<'c, R> {
     /// From the start of `program`, whose sub-programs are known.
     pub fn new(program: Program<R>, calls: &'c mut SubPrograms) -> Self {
         let dialect = program.dialect();
-        Passage { program, calls, bounds: Bounds::default(), dialect, passed: 0 }
+        Passage { program, calls, bounds: Bounds::default(), dialect, passed: 0, without_point: 0 }
     }
 
     /// Lines passed so far; the sub-programs that they call do not count.
     pub fn passed(&self) -> usize {
         self.passed
+    }
+
+    /// Numbers of axes passed so far that are not zero and have no point.
+    pub fn without_point(&self) -> u64 {
+        self.without_point
     }
 
     /// Leads the follower over one line; whether there was one.
@@ -147,7 +166,8 @@ impl<'c, R: BufRead> Passage<'c, R> {
     pub fn step<'a>(&mut self, follower: &mut dyn Follow<'a>, out: &mut dyn Write) -> Result<bool> {
         let Some(mut block) = self.program.next_block()? else { return Ok(false) };
         self.passed += 1;
-        if self.bounds.of(&block, self.dialect).is_some() {
+        self.without_point += without_point(&block);
+        if !self.calls.is_empty() && self.bounds.of(&block, self.dialect).is_some() {
             self.calls.write(&block, out)?;
         } else {
             self.calls.block(follower, &mut block, 0, out)?;

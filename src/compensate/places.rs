@@ -12,7 +12,7 @@ enum Status {
 }
 
 /// What is known of all axes, in the order of the control's.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Places {
     status: Vec<Status>,
     /// Whether the program, or the set-up, has said where it stands.

@@ -25,6 +25,14 @@ impl Position {
         &self.program
     }
 
+    /// Whether both are the same to the last bit.
+    pub fn is_as(&self, other: &Position) -> bool {
+        let same = |a: &[f64], b: &[f64]| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+        };
+        same(&self.q, &other.q) && same(&self.program, &other.program)
+    }
+
     /// Another place of one joint; what the program calls it stays to be told.
     pub fn set_joint(&mut self, command: usize, q: f64) {
         self.q[command] = q;

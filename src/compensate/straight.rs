@@ -118,9 +118,9 @@ fn unsplit(pass: &Pass, at: &dyn Fn(f64) -> Few<f64>, count: usize) -> f64 {
 /// Largest error of the tip between the ends of a straight move, m.
 fn mid_line(pass: &Pass, meant: (&Position, &Position), written: (&Position, &Position)) -> f64 {
     let control = pass.program().control();
-    let at = |s: f64| {
-        let there = control.between(meant.0, meant.1, s).zip(control.between(written.0, written.1, s));
-        there.map_or(0.0, |(meant, sent)| pass.corrector().distance(control, &sent, &meant))
-    };
-    LOOKS.into_iter().map(at).fold(0.0, f64::max)
+    let goals_w = control.tips_between(meant.0, meant.1, LOOKS);
+    let sent = LOOKS.map(|s| control.between(written.0, written.1, s));
+    let [Some(a), Some(b), Some(c)] = sent else { return 0.0 };
+    let tips_w = pass.corrector().tips_w(control, &[a, b, c]);
+    goals_w.into_iter().zip(tips_w).map(|(goal, tip)| (tip - goal).norm()).fold(0.0, f64::max)
 }

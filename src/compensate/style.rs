@@ -1,5 +1,7 @@
 //! How a program writes its numbers.
 
+use std::borrow::Cow;
+
 use super::control::Control;
 use crate::nc::{Block, Dialect, Motion, Number, Units, Value, Word};
 
@@ -7,7 +9,7 @@ use crate::nc::{Block, Dialect, Motion, Number, Units, Value, Word};
 const MOST_DECIMALS: usize = 6;
 
 /// The habits of a program as far as it has been read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Style {
     /// Digits behind the point as the user wants them.
     wanted: Option<usize>,
@@ -61,8 +63,8 @@ impl Style {
     }
 
     /// With the decimal comma where the program has it.
-    pub fn pointed(&self, text: &str) -> String {
-        if self.comma { text.replace('.', ",") } else { text.to_string() }
+    pub fn pointed<'t>(&self, text: &'t str) -> Cow<'t, str> {
+        if self.comma { Cow::Owned(text.replace('.', ",")) } else { Cow::Borrowed(text) }
     }
 
     /// A number for an axis as its neighbour `model` is written.

@@ -111,6 +111,11 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
+    /// Whether the last line belongs to a sub-program that has not ended.
+    pub fn is_inside(&self) -> bool {
+        self.inside.is_some()
+    }
+
     /// The sub-program that this line belongs to, its first and last line included.
     pub fn of(&mut self, block: &Block, dialect: Dialect) -> Option<String> {
         let text = String::from_utf8_lossy(block.bytes());
@@ -171,6 +176,10 @@ impl SubPrograms {
         out: &mut dyn Write,
     ) -> Result<()> {
         let dialect = follower.program().dialect();
+        // Without sub-programs only the name of the program itself is no block.
+        if self.bodies.is_empty() && !block.bytes().iter().any(|b| matches!(b, b'O' | b'o' | b':')) {
+            return follower.block(block, out);
+        }
         let (name, times) = match mark(block, dialect) {
             Mark::Call(name, times) if self.bodies.contains_key(&name) && !follower.program().ended() => {
                 (name, times)

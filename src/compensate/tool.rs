@@ -5,7 +5,7 @@ use super::setup::Setup;
 use crate::nc::{Block, Dialect, Modes};
 
 /// Which tool is in the spindle, and which one the control counts with.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Tool {
     in_spindle: Option<String>,
     called: Option<String>,

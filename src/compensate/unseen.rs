@@ -38,6 +38,15 @@ impl UnseenSums {
         }
     }
 
+    /// Takes up the moves that follow.
+    pub fn absorb(&mut self, next: &UnseenSums) {
+        self.sums.resize(self.sums.len().max(next.sums.len()), (0.0, 0.0));
+        self.moves += next.moves;
+        for (sum, next) in self.sums.iter_mut().zip(&next.sums) {
+            *sum = (sum.0 + next.0, sum.1 + next.1);
+        }
+    }
+
     /// What the patterns did over all moves, largest first.
     pub fn report(&self, machine: &Machine, patterns: &[Vec<Twist<f64>>]) -> Unseen {
         let mean = |sum: f64| (sum / self.moves.max(1) as f64).sqrt();

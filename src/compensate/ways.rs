@@ -6,7 +6,7 @@ use super::control::Control;
 use super::places::Places;
 
 /// What was known at the position that the machine was last told to go to.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ways {
     /// By axis: whether it was known where it stood.
     sure: Few<bool>,

@@ -20,12 +20,13 @@ pub(super) fn put_into(
     for number in numbers {
         let (axis, text) = (number.axis(), number.text());
         if let Some(word) = words[axis] {
-            block.replace(word, &style.pointed(text))?;
+            block.replace_number(word, &style.pointed(text))?;
             report.corrected_words += 1;
             continue;
         }
         let address = control.axes()[axis].address();
-        let text = style.pointed(&style.like(text, model, control, axis));
+        let text = style.like(text, model, control, axis);
+        let text = style.pointed(&text);
         // Behind the nearest axis before it, else before the first one, else at the end.
         let before = words[..axis].iter().rev().flatten().next().copied();
         let behind = words[axis..].iter().flatten().next().copied();

@@ -2,39 +2,74 @@
 
 use std::io::Write;
 
+use super::corrector::Solvers;
 use super::curve;
 use super::cycle;
 use super::fault::CompensateFault;
 use super::interpreter::Interpreter;
 use super::model::Model;
 use super::options::CompensateOptions;
+use super::part::Part;
 use super::pass::Pass;
 use super::refusal::{line_text, refuse};
 use super::report::Report;
+use super::standing::Standing;
 use super::straight;
 use super::subprograms::Follow;
 use crate::error::Result;
+use crate::few::Few;
 use crate::nc::{Block, MotionKind};
 
 /// A program that is written as its errors ask for.
-pub(super) struct Writer<'a> {
-    pass: Pass<'a>,
+pub(super) struct Writer<'a, 'm> {
+    pass: Pass<'a, 'm>,
 }
 
-impl<'a> Writer<'a> {
+impl<'a, 'm> Writer<'a, 'm> {
     /// From the start of `program`; `first` as for [`Pass::new`].
     pub fn new(
         program: Interpreter<'a>,
-        model: &'a mut dyn Model,
-        options: &'a CompensateOptions,
+        model: &'m mut dyn Model,
+        solvers: &'m Solvers<'a>,
+        options: &'m CompensateOptions,
         first: &[i8],
     ) -> Self {
-        Writer { pass: Pass::new(program, model, options, first) }
+        Writer { pass: Pass::new(program, model, solvers, options, first) }
+    }
+
+    /// Behind some lines, as [`Pass::behind`].
+    pub fn behind(
+        start: Standing<'a>,
+        model: &'m mut dyn Model,
+        solvers: &'m Solvers<'a>,
+        options: &'m CompensateOptions,
+    ) -> Self {
+        Writer { pass: Pass::behind(start, model, solvers, options) }
+    }
+
+    /// As [`Pass::stop`].
+    pub fn stop(self) -> (Part, Standing<'a>) {
+        self.pass.stop()
+    }
+
+    /// As [`Pass::end_batch`].
+    pub fn end_batch(&mut self) {
+        self.pass.end_batch();
+    }
+
+    /// As [`Pass::foresee`].
+    pub fn foresee(&mut self, meant: &[Few<f64>]) {
+        self.pass.foresee(meant);
+    }
+
+    /// As [`Pass::absorb`].
+    pub fn absorb(&mut self, before: Part) {
+        self.pass.absorb(before);
     }
 
     /// Whether anything is written otherwise than it was.
-    pub fn has_corrected(&mut self) -> bool {
-        self.pass.report().has_corrected()
+    pub fn has_corrected(&self) -> bool {
+        self.pass.has_corrected()
     }
 
     /// The report of what was written.
@@ -43,7 +78,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-impl<'a> Follow<'a> for Writer<'a> {
+impl<'a> Follow<'a> for Writer<'a, '_> {
     fn program(&self) -> &Interpreter<'a> {
         self.pass.program()
     }

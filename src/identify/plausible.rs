@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::evaluator::{Evaluator, Moment};
 use super::solve::Problem;
+use super::stretch::Stretch;
 use super::unknowns::Unknowns;
 use super::{Layout, Placed, Sources, enough_to_start, is_of_setup, place};
 use crate::error::Result;
@@ -135,57 +136,67 @@ pub(super) fn plausibility_of(
     };
     let spread: Vec<f64> = sources.ranges().iter().enumerate().map(|(c, range)| spread(c, range)).collect();
     let mut sizes: Vec<ByQuantity<Sizes>> = vec![ByQuantity::default(); sources.all.len()];
-    sources.pass(
-        |index, stretch| {
-            let (source, evaluator) = (&sources.all[index], &evaluators[index]);
-            let known = !sources.frame_unknown[source.setup];
-            let (count, values) = (source.sensor.reading_count(), source.recording.value_count());
-            let sigma = source.recording.header().sigma;
-            let stride = source.summary.samples.div_ceil(ENOUGH).max(1) as usize;
-            let mut work = evaluator.workspace();
-            let width = evaluator.width();
-            let mut rows = vec![0.0; MOST_READINGS * width];
-            let mut own = ByQuantity::<Sizes>::default();
-            for k in (0..stretch.chunk.len).step_by(stride.min(stretch.chunk.len.max(1))) {
-                let q = stretch.q(k);
-                let measured = &stretch.chunk.values[k * values..(k + 1) * values];
-                let residuals =
-                    evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, Some(&mut rows));
-                let mut squares = ByQuantity { m: [0.0; 3], rad: [0.0; 3] };
-                let mut seen = ByQuantity { m: false, rad: false };
-                for (i, residual) in residuals.iter().take(count).enumerate() {
-                    let quantity = source.quantity(machine, i);
-                    let row = &rows[i * width..(i + 1) * width];
-                    let noise = sigma.filter(|s| s.quantity == quantity).map_or(0.0, |s| s.value);
-                    let added = [
-                        residual * residual,
-                        foretold(machine, row, known) + noise * noise,
-                        moved(machine, row, &spread),
-                    ];
-                    squares[quantity].iter_mut().zip(added).for_each(|(sum, added)| *sum += added);
-                    seen[quantity] = true;
-                }
-                for quantity in [Quantity::Length, Quantity::Angle] {
-                    if seen[quantity] {
-                        let [left, foretold, moved] = squares[quantity].map(f64::sqrt);
-                        let own = &mut own[quantity];
-                        own.left.push(left);
-                        own.foretold.push(foretold);
-                        own.moved.push(moved);
-                    }
-                }
+    let of = |index: usize, len: usize| {
+        let stride = sources.all[index].summary.samples.div_ceil(ENOUGH).max(1) as usize;
+        (0..len).step_by(stride.min(len.max(1)))
+    };
+    let look = |index: usize, stretch: &Stretch, samples: &mut dyn Iterator<Item = usize>| {
+        let (source, evaluator) = (&sources.all[index], &evaluators[index]);
+        let known = !sources.frame_unknown[source.setup];
+        let (count, values) = (source.sensor.reading_count(), source.recording.value_count());
+        let sigma = source.recording.header().sigma;
+        let mut work = evaluator.workspace();
+        let width = evaluator.width();
+        let mut rows = vec![0.0; MOST_READINGS * width];
+        let mut own = ByQuantity::<Sizes>::default();
+        for k in samples {
+            let q = stretch.q(k);
+            let measured = &stretch.chunk.values[k * values..(k + 1) * values];
+            let residuals =
+                evaluator.residuals(q, measured, Moment::At(stretch, k), &mut work, Some(&mut rows));
+            let mut squares = ByQuantity { m: [0.0; 3], rad: [0.0; 3] };
+            let mut seen = ByQuantity { m: false, rad: false };
+            for (i, residual) in residuals.iter().take(count).enumerate() {
+                let quantity = source.quantity(machine, i);
+                let row = &rows[i * width..(i + 1) * width];
+                let noise = sigma.filter(|s| s.quantity == quantity).map_or(0.0, |s| s.value);
+                let added = [
+                    residual * residual,
+                    foretold(machine, row, known) + noise * noise,
+                    moved(machine, row, &spread),
+                ];
+                squares[quantity].iter_mut().zip(added).for_each(|(sum, added)| *sum += added);
+                seen[quantity] = true;
             }
-            own
-        },
-        |index, own| {
             for quantity in [Quantity::Length, Quantity::Angle] {
-                let (sum, own) = (&mut sizes[index][quantity], &own[quantity]);
-                sum.left.extend(&own.left);
-                sum.foretold.extend(&own.foretold);
-                sum.moved.extend(&own.moved);
+                if seen[quantity] {
+                    let [left, foretold, moved] = squares[quantity].map(f64::sqrt);
+                    let own = &mut own[quantity];
+                    own.left.push(left);
+                    own.foretold.push(foretold);
+                    own.moved.push(moved);
+                }
             }
-        },
-    )?;
+        }
+        own
+    };
+    let take = |index: usize, own: ByQuantity<Sizes>| {
+        for quantity in [Quantity::Length, Quantity::Angle] {
+            let (sum, own) = (&mut sizes[index][quantity], &own[quantity]);
+            sum.left.extend(&own.left);
+            sum.foretold.extend(&own.foretold);
+            sum.moved.extend(&own.moved);
+        }
+    };
+    if sources.is_plain() {
+        sources.pass_few(
+            |index, _, len| of(index, len).collect(),
+            |index, stretch| look(index, stretch, &mut (0..stretch.chunk.len)),
+            take,
+        )?;
+    } else {
+        sources.pass(|index, stretch| look(index, stretch, &mut of(index, stretch.chunk.len)), take)?;
+    }
     let mut all = Vec::new();
     for (number, (source, mut sizes)) in sources.all.iter().zip(sizes).enumerate() {
         for quantity in [Quantity::Length, Quantity::Angle] {

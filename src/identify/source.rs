@@ -382,6 +382,40 @@ impl<'a> Sources<'a> {
         self.pass_over(Which::Fit, work, merge)
     }
 
+    /// Whether any sample can be had apart from the others: nothing depends on the path, and all are for the fit.
+    pub fn is_plain(&self) -> bool {
+        let is_plain = |s: &Source| s.cached.is_none() && s.beginning.is_none() && s.picked.is_none();
+        self.all.iter().all(|source| is_plain(source) && source.recording.stored().is_some())
+    }
+
+    /// As [`Sources::pass`] over plain samples, a few of each chunk: `few` says which, by their index in it, from the number of the source,
+    /// how many of its samples come before the chunk, and how many it has. Of what lies in files the others are not read.
+    pub fn pass_few<T: Send>(
+        &self,
+        few: impl Fn(usize, u64, usize) -> Vec<usize> + Sync,
+        work: impl Fn(usize, &Stretch) -> T + Sync,
+        mut merge: impl FnMut(usize, T),
+    ) -> Result<()> {
+        let commands = self.machine.commands().len();
+        for (index, source) in self.all.iter().enumerate() {
+            let Some(stored) = source.recording.stored() else { continue };
+            let mut before = 0;
+            let chunks = (0..stored.len()).map(|i| {
+                let own = before;
+                before += stored.samples(i) as u64;
+                (i, few(index, own, stored.samples(i)))
+            });
+            let chunks: Vec<(usize, Vec<usize>)> = chunks.filter(|(_, few)| !few.is_empty()).collect();
+            let part = |(i, few): &(usize, Vec<usize>)| {
+                let chunk = Arc::new(stored.chosen(*i, few)?);
+                Ok(work(index, &Stretch::plain(chunk, commands)))
+            };
+            let parts = chunks.par_iter().map(part).collect::<Result<Vec<_>>>()?;
+            parts.into_iter().for_each(|part| merge(index, part));
+        }
+        Ok(())
+    }
+
     /// As [`Sources::pass`], over the samples for the fit or those held out.
     pub fn pass_over<T: Send>(
         &self,

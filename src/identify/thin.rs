@@ -7,6 +7,7 @@ use super::source::Sources;
 use super::unknowns::Unknowns;
 use crate::error::Result;
 use crate::machine::Machine;
+use crate::recording::Chunk;
 use crate::units::ByQuantity;
 
 /// No instrument resolves less, m or rad; without it, exact simulated data would have no noise at all.
@@ -31,26 +32,33 @@ pub(crate) fn thin(machine: &Machine, sources: &Sources) -> Result<Vec<Thin>> {
         return Ok(replay.thin.iter().enumerate().flat_map(of).collect());
     }
     let commands = machine.commands().len();
-    let mut seen = vec![0u64; sources.all.len()];
     let mut all = Vec::new();
+    let mut take = |source: usize, chunk: &Chunk, k: usize| {
+        let width = sources.all[source].recording.value_count();
+        let (q, values) = (&chunk.commands[k * commands..], &chunk.values[k * width..]);
+        all.push(Thin { source, q: q[..commands].to_vec(), values: values[..width].to_vec() });
+    };
+    let strides: Vec<u64> =
+        sources.all.iter().map(|source| source.summary.samples.div_ceil(MOST).max(1)).collect();
+    if sources.is_plain() {
+        sources.pass_few(
+            |index, before, len| {
+                let first = before.next_multiple_of(strides[index]) - before;
+                (first..len as u64).step_by(strides[index] as usize).map(|k| k as usize).collect()
+            },
+            |_, stretch| stretch.chunk.clone(),
+            |index, chunk| (0..chunk.len).for_each(|k| take(index, &chunk, k)),
+        )?;
+        return Ok(all);
+    }
+    let mut seen = vec![0u64; sources.all.len()];
     // The chunks come in order, so the running number of a sample is known when they are merged.
     sources.pass(
         |_, stretch| stretch.chunk.clone(),
         |index, chunk| {
-            let (q, values, len) = (&chunk.commands, &chunk.values, chunk.len);
-            let source = &sources.all[index];
-            let width = source.recording.value_count();
-            let stride = source.summary.samples.div_ceil(MOST).max(1);
-            for k in 0..len {
-                if (seen[index] + k as u64).is_multiple_of(stride) {
-                    all.push(Thin {
-                        source: index,
-                        q: q[k * commands..(k + 1) * commands].to_vec(),
-                        values: values[k * width..(k + 1) * width].to_vec(),
-                    });
-                }
-            }
-            seen[index] += len as u64;
+            let is_one = |k: &usize| (seen[index] + *k as u64).is_multiple_of(strides[index]);
+            (0..chunk.len).filter(is_one).for_each(|k| take(index, &chunk, k));
+            seen[index] += chunk.len as u64;
         },
     )?;
     Ok(all)

@@ -4,7 +4,7 @@ use super::modes::{Coordinate, Distance, Modes, Why};
 use super::words::{How, Word};
 
 /// The axes that are followed, and their programmed positions.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Axes {
     addresses: Vec<String>,
     coordinates: Vec<Coordinate>,

@@ -77,6 +77,20 @@ impl Block {
         self.tokens.iter().rfind(|t| t.kind != Kind::Comment).map_or(0, |t| t.span.end)
     }
 
+    /// Whether the line has nothing but block numbers, words of axes and feeds, and `G0` or `G1`: all that it can change are where axes are,
+    /// the motion and the feed.
+    pub(crate) fn is_plain_motion(&self) -> bool {
+        let is_plain = |word: &Word| match (word.address.as_str(), word.value) {
+            ("X" | "Y" | "Z" | "A" | "B" | "C" | "U" | "V" | "W" | "F", Value::Number(_)) => true,
+            ("G", Value::Number(number)) => matches!(number.value, 0.0 | 1.0),
+            _ => false,
+        };
+        self.tokens.iter().all(|token| match token.kind {
+            Kind::Word(index) => is_plain(&self.words[index]),
+            kind => kind == Kind::BlockNumber,
+        })
+    }
+
     /// Whether a word has this address.
     pub(super) fn has_word(&self, address: &str) -> bool {
         self.words.iter().any(|w| w.address == address)
@@ -116,11 +130,25 @@ impl Block {
             };
             return Err(self.fault(found.value_span.start, fault));
         }
-        let span = found.value_span.clone();
-        self.check_number(span.start, text)?;
+        let start = found.value_span.start;
+        self.check_number(start, text)?;
+        self.put(word, text);
+        Ok(())
+    }
+
+    /// As [`Block::replace`], by what was read as a plain number already; of a word that has a plain number.
+    pub(crate) fn replace_number(&mut self, word: usize, text: &str) -> Result<()> {
+        match self.word(word)?.value {
+            Value::Number(_) => self.put(word, text),
+            Value::Expression => self.replace(word, text)?,
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, word: usize, text: &str) {
+        let span = self.words[word].value_span.clone();
         self.edits.retain(|(range, _)| *range != span);
         self.edit(span, &[text]);
-        Ok(())
     }
 
     /// Puts a new word behind word `after`, for an axis that the block does not name: with `=` where the address needs it,
@@ -178,6 +206,12 @@ impl Block {
         }
         self.check_number(end, number)?;
         Ok(if address.len() > 1 { "=" } else { "" })
+    }
+
+    /// Takes every change back.
+    pub(crate) fn restore(&mut self) {
+        self.edits.clear();
+        self.patches.clear();
     }
 
     /// Whether anything was replaced or inserted.

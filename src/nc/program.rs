@@ -122,6 +122,23 @@ impl<R: BufRead> Program<R> {
     /// # Errors
     /// [`NcFault::LineTooLong`] with its line, [`Error::File`].
     pub fn next_block(&mut self) -> Result<Option<Block>> {
+        Ok(self.next_line()?.map(|bytes| self.block_of(bytes)))
+    }
+
+    /// The line that was returned last as a block.
+    pub(crate) fn block_of(&self, bytes: Vec<u8>) -> Block {
+        let mut block = Block::of_file(self.file.clone(), self.line, bytes, self.dialect);
+        block.count_increments(self.increments);
+        block
+    }
+
+    /// Number of the line that was returned last.
+    pub(crate) fn line(&self) -> usize {
+        self.line
+    }
+
+    /// The bytes of the next block; otherwise as [`Program::next_block`].
+    pub(crate) fn next_line(&mut self) -> Result<Option<Vec<u8>>> {
         if self.ended {
             return Ok(None);
         }
@@ -131,13 +148,8 @@ impl<R: BufRead> Program<R> {
             (None, None) => self.read_line(),
         };
         self.ended = !matches!(line, Ok(Some(_)));
-        let line = line?;
         self.line += 1;
-        Ok(line.map(|bytes| {
-            let mut block = Block::of_file(self.file.clone(), self.line, bytes, self.dialect);
-            block.count_increments(self.increments);
-            block
-        }))
+        line
     }
 
     /// The next line with its line end.

@@ -15,7 +15,7 @@ use super::unfollowed::{Known, unknown_functions};
 use crate::error::Result;
 
 /// Modal state of a program, followed block by block.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct State {
     dialect: Dialect,
     axes: Axes,
@@ -146,7 +146,7 @@ impl State {
             Purpose::Target => {}
         }
         let polar: &[&str] = if self.dialect == Dialect::Heidenhain { &["PR", "PA"] } else { &["AP", "RP"] };
-        let by_polar = polar.iter().any(|a| block.has_word(a)) && self.dialect != Dialect::Rs274;
+        let by_polar = self.dialect != Dialect::Rs274 && polar.iter().any(|a| block.has_word(a));
         let direction = ["A2", "B2", "C2", "A3", "B3", "C3", "LEAD", "TILT", "TX", "TY", "TZ"];
         let by_direction = self.dialect != Dialect::Rs274
             && direction.iter().any(|a| block.has_word(a) && !self.axes.addresses().iter().any(|o| o == a));

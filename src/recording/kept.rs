@@ -95,6 +95,18 @@ impl Stored {
         }
     }
 
+    /// These samples of chunk `i` alone, by their index in it.
+    ///
+    /// # Errors
+    /// As [`Stored::chunk`].
+    pub fn chosen(&self, i: usize, samples: &[usize]) -> Result<Chunk> {
+        match (self.first.get(i), &self.others) {
+            (Some(chunk), _) => Ok(chunk.chosen(samples)),
+            (None, Some(spool)) => spool.chosen(i - self.first.len(), samples),
+            (None, None) => Ok(Chunk::default()),
+        }
+    }
+
     /// Whether all of it is in memory.
     pub fn is_in_memory(&self) -> bool {
         self.others.is_none()

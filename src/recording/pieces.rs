@@ -1,6 +1,6 @@
 //! A source in pieces that end where lines end, so that each can be read apart from the others.
 
-use std::io::{ErrorKind, Read, Result};
+use std::io::{Read, Result};
 
 use super::lines::LONGEST;
 
@@ -48,20 +48,11 @@ impl Pieces {
 
     /// Reads on to the length of a piece, or as much again.
     fn fill(&mut self, piece: &mut Vec<u8>) -> Result<()> {
-        let mut filled = piece.len();
-        piece.resize(PIECE.max(2 * filled), 0);
-        while filled < piece.len() {
-            match self.source.read(&mut piece[filled..]) {
-                Ok(0) => {
-                    self.ended = true;
-                    break;
-                }
-                Ok(count) => filled += count,
-                Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                Err(e) => return Err(e),
-            }
-        }
-        piece.truncate(filled);
+        let more = PIECE.max(2 * piece.len()) - piece.len();
+        // With a byte to spare, or to ask for the end would take a longer buffer.
+        piece.reserve(more + 1);
+        let read = self.source.by_ref().take(more as u64).read_to_end(piece)?;
+        self.ended = read < more;
         Ok(())
     }
 }

@@ -384,6 +384,13 @@ mod tests {
             assert_eq!(spooled.scan().expect("rows"), kept.scan().expect("rows"));
             assert!(spooled.stored().is_some_and(|stored| !stored.is_in_memory()));
             assert_eq!(chunks(&spooled).expect("numbers"), chunks(&kept).expect("rows"));
+            let (stored, whole) = (spooled.stored().expect("a pass"), kept.stored().expect("a pass"));
+            for samples in [vec![], vec![0], vec![1, 7, 2000], (0..900).collect()] {
+                for i in [0, 1, whole.len() - 2] {
+                    let chosen = stored.chosen(i, &samples).expect("numbers");
+                    assert_eq!(chosen, whole.chosen(i, &samples).expect("rows"));
+                }
+            }
             let few = recording("# measurement: joint\n# fixed c[deg]: 0\nx[mm],x_meas[mm]\n1,1\n2,2\n")
                 .within(&memory);
             few.scan().expect("rows");

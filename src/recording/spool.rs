@@ -11,6 +11,9 @@ use super::Recording;
 use super::chunk::Chunk;
 use crate::error::{Error, Place, Result};
 
+/// Of a chunk fewer samples than one in so many are read one by one.
+const WORTH: usize = 64;
+
 /// Which columns chunks of a recording have.
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
@@ -135,7 +138,44 @@ impl Spool {
     }
 }
 
+impl Spool {
+    /// These samples of chunk `i` alone, by their index in it. Few of them are read one by one.
+    ///
+    /// # Errors
+    /// As [`Spool::chunk`].
+    pub fn chosen(&self, i: usize, samples: &[usize]) -> Result<Chunk> {
+        let Some(at) = self.chunks.get(i) else { return Ok(Chunk::default()) };
+        if samples.len() > at.len / WORTH {
+            return Ok(self.chunk(i)?.chosen(samples));
+        }
+        let mut bytes = Vec::with_capacity(8 * samples.len() * (self.shape.width() + 1));
+        let (mut offset, lines) = (at.offset, usize::from(at.first_line.is_none()));
+        for width in (0..lines).map(|_| 1).chain(self.shape.columns()) {
+            for k in samples {
+                let from = bytes.len();
+                bytes.resize(from + 8 * width, 0);
+                let place = offset + 8 * (width * k) as u64;
+                self.file.read(place, &mut bytes[from..]).map_err(|e| Error::file(&self.file.path, e))?;
+            }
+            offset += 8 * (width * at.len) as u64;
+        }
+        let few = At { offset: 0, len: samples.len(), dropped: 0, first_line: at.first_line };
+        let mut chunk = self.shape.chunk(&few, &bytes);
+        if let Some(first) = at.first_line {
+            chunk.lines = samples.iter().map(|k| first + *k as u64).collect();
+        }
+        Ok(chunk)
+    }
+}
+
 impl Shape {
+    /// Width of each block of numbers of a chunk, in their order.
+    fn columns(&self) -> impl Iterator<Item = usize> {
+        let directions = self.directions.iter().filter(|there| **there).count();
+        let single = usize::from(self.time) + directions + self.channels;
+        [self.commands, self.values].into_iter().chain((0..single).map(|_| 1))
+    }
+
     /// The chunk whose numbers these are.
     fn chunk(&self, at: &At, bytes: &[u8]) -> Chunk {
         let mut rest = bytes;

@@ -16,6 +16,7 @@ use proptest::prelude::*;
 use crate::common::machine;
 
 mod any;
+mod batches;
 mod clients;
 mod constructs;
 mod linuxcnc;
