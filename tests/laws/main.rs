@@ -5,6 +5,8 @@
 mod common;
 #[path = "../mutated/mod.rs"]
 mod mutated;
+#[path = "../signatures/mod.rs"]
+mod signatures_drawn;
 
 mod arrays;
 mod bad_effects;
@@ -34,4 +36,5 @@ mod nc;
 mod partial;
 mod recordings;
 mod rooms;
+mod signatures;
 mod simulate;
