@@ -16,6 +16,7 @@ mod calibrated;
 mod compensate;
 mod convert;
 mod convert_path;
+mod convert_targets;
 mod effects;
 mod effects_in_files;
 mod export;
