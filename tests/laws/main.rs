@@ -21,6 +21,7 @@ mod effects;
 mod effects_in_files;
 mod export;
 mod export_controls;
+mod export_motions;
 mod features;
 mod import;
 mod import_dh;
