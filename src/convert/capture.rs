@@ -44,6 +44,11 @@ pub(super) fn read(file: &Path, bytes: &[u8], told: &Told) -> Result<Table> {
     if there < count {
         return Err(fault(line, format!("{count} readings are announced, the file holds {there}"), WHOLE));
     }
+    let behind = &bytes[ends + 8 * count..];
+    if !behind.is_empty() && !behind.trim_ascii_start().starts_with(b"EOF::") {
+        let what = format!("behind {count} readings stands something else than `EOF::`");
+        return Err(fault(line, what, WHOLE));
+    }
     let readings =
         bytes[ends..].as_chunks::<8>().0.iter().take(count).map(|eight| f64::from_le_bytes(*eight));
     let readings: Vec<f64> = readings.collect();

@@ -24,10 +24,11 @@ fn is_pictured(family: &Family) -> bool {
 /// All pictures, then the page.
 pub fn draw(library: &Library) -> Vec<Drawn> {
     let scenes = scene::all();
+    let ready = trace::Ready::all(library, &scenes);
     let mut drawn = Vec::new();
     let mut shown: Vec<page::Shown> = Vec::new();
     for (index, family) in library.families().iter().enumerate().filter(|(_, family)| is_pictured(family)) {
-        let trace = trace::of(library, index, &scenes);
+        let trace = trace::of(library, index, &ready);
         let before = shown.iter().filter(|shown| shown.family.name == family.name).count();
         let file = match before {
             0 => format!("{}.svg", family.name),

@@ -71,22 +71,42 @@ const VALUES: [(&str, &str, f64, f64); 26] = [
     ("sub_harmonic_runout", "per_rev", 0.45, 0.45),
 ];
 
+/// A scene with what the library makes of it.
+pub struct Ready<'a> {
+    scene: &'a Scene,
+    samples: Vec<Samples>,
+    candidates: Vec<Candidate>,
+}
+
+impl<'a> Ready<'a> {
+    /// All scenes, in their order.
+    pub fn all(library: &Library, scenes: &'a [Scene]) -> Vec<Ready<'a>> {
+        let ready = |scene: &'a Scene| Ready {
+            scene,
+            samples: samples(scene),
+            candidates: library.candidates(&scene.machine, &scene.facts).all,
+        };
+        scenes.iter().map(ready).collect()
+    }
+}
+
 /// The trace in the first scene that shows the family; where a bar can point three ways, in the one that shows most.
-pub fn of<'a>(library: &Library, index: usize, scenes: &'a [Scene]) -> Trace<'a> {
+pub fn of<'a>(library: &Library, index: usize, ready: &[Ready<'a>]) -> Trace<'a> {
     let family = &library.families()[index];
     let mut best: Option<(f64, Trace)> = None;
-    for scene in scenes.iter().filter(|scene| comes_into_question(family, scene)) {
+    for Ready { scene, samples, candidates } in
+        ready.iter().filter(|own| comes_into_question(family, own.scene))
+    {
+        let scene: &'a Scene = scene;
         if best.as_ref().is_some_and(|(_, best)| best.scene.name != scene.name) {
             break;
         }
-        let samples = samples(scene);
-        let all = library.candidates(&scene.machine, &scene.facts).all;
-        let mut own: Vec<&Candidate> = all.iter().filter(|c| c.family == index).collect();
+        let mut own: Vec<&Candidate> = candidates.iter().filter(|c| c.family == index).collect();
         own.sort_by_key(|candidate| rank(candidate.place, scene));
         for candidate in own {
             let readings = match candidate.scatter {
-                Some(_) => scattered(candidate, scene, &samples),
-                None => readings(family, candidate, scene, &samples),
+                Some(_) => scattered(candidate, scene, samples),
+                None => readings(family, candidate, scene, samples),
             };
             let size = rms(&readings);
             if size > NOTHING && best.as_ref().is_none_or(|(most, _)| size > 1.05 * most) {
