@@ -22,6 +22,7 @@ mod effects_in_files;
 mod export;
 mod export_controls;
 mod export_motions;
+mod export_springs;
 mod features;
 mod import;
 mod import_dh;
