@@ -4,7 +4,9 @@
 //! not say is not guessed: an error lists what has to be told. A [`Map`] says all of it; `docs/convert.md`.
 
 mod align;
+mod capture;
 mod cell;
+mod deviations;
 mod draft;
 mod follow;
 mod form;
@@ -19,11 +21,14 @@ mod moment;
 mod nominal;
 mod npy;
 mod plan;
+mod positioning;
+mod r_test;
 mod renishaw;
 mod rotation;
 mod shapes;
 mod table;
 mod target;
+mod targets;
 mod text;
 mod unit;
 mod write;
@@ -37,6 +42,7 @@ pub(crate) use form::Separator;
 pub(crate) use heading::{Heading, Stated};
 pub use map::{Map, Part};
 pub use nominal::Nominal;
+pub use positioning::{BothWays, OneWay, Positioning};
 pub use write::Written;
 
 use crate::error::{Error, Place, Result};
@@ -49,7 +55,7 @@ use table::{Table, Told};
 pub struct Request {
     /// The file of a map, which then says everything; the fields below, but for the joint, are not asked.
     pub map: Option<PathBuf>,
-    /// What was measured: `position`, `pose`, `joint`, `distance` or `displacement`.
+    /// What was measured: `position`, `pose`, `joint`, `distance` or `displacement`; `r-test` where linear axes followed a ball.
     pub measurement: Option<String>,
     /// Columns of the recording and the columns of the table that they are; `q*` for all joints of such names.
     pub columns: Vec<(String, String)>,
@@ -75,7 +81,7 @@ pub struct Request {
     pub joint: Option<String>,
     /// From which side the targets of a laser were approached: `alternating`, `rising` or `falling`.
     pub approach: Option<String>,
-    /// What deviations of a laser are: `laser-minus-target`, or `target-minus-laser`.
+    /// What deviations are: of a laser `laser-minus-target` or `target-minus-laser`, of an R-test `ball-minus-tool` or `tool-minus-ball`.
     pub deviation: Option<String>,
     /// What separates columns: `comma`, `semicolon`, `tab`, `blanks`.
     pub separator: Option<String>,
@@ -93,12 +99,14 @@ pub struct Request {
 pub struct Converted {
     /// One for each marker.
     pub recordings: Vec<Written>,
-    /// The map that made them, as a file.
+    /// The map that made them, as a file; empty where the table was not read column by column: deviations at targets, an R-test.
     pub map: String,
     /// What was guessed or left out, one sentence each.
     pub told: Vec<String>,
     /// Where the path lies in the readings, where one was told.
     pub alignment: Option<Alignment>,
+    /// How well the axis comes to its targets, where the table is of that.
+    pub positioning: Option<Positioning>,
 }
 
 /// Reads the table at `path`.
@@ -159,13 +167,33 @@ pub fn read(
             names: request.names.clone(),
         },
     };
-    let (table, laser) = if renishaw::is_one(file, bytes) {
-        let (table, map, notes) = renishaw::read(file, bytes, machine, request)?;
-        (table, Some((map, notes)))
+    let is_r_test = known.is_none() && request.measurement.as_deref() == Some(r_test::WORD);
+    // A map says everything, and columns that are named make a table of their own.
+    let is_free = known.is_none() && request.columns.is_empty() && request.path.is_none() && !is_r_test;
+    let (table, measured) = if renishaw::is_one(file, bytes) {
+        (None, Some(renishaw::read(file, bytes, machine, request)?))
+    } else if capture::is_one(file, bytes) {
+        (Some(capture::read(file, bytes, &told)?), None)
     } else if bytes.starts_with(npy::MAGIC) {
-        (npy::read(file, bytes, &told)?, None)
+        (Some(npy::read(file, bytes, &told)?), None)
+    } else if let Some(head) = targets::head(bytes, &told).filter(|_| is_free) {
+        (None, Some(targets::read(file, bytes, &head, machine, request)?))
     } else {
-        (Table::read(file, bytes, &told)?, None)
+        (Some(Table::read(file, bytes, &told)?), None)
+    };
+    let measured = match (&table, machine) {
+        (Some(table), Some(machine)) if is_r_test => Some(r_test::read(table, machine, request)?),
+        _ => measured,
+    };
+    let is_mapped = !is_r_test && !measured.as_ref().is_some_and(|own| own.is_rearranged);
+    let mut positioning = None;
+    let (table, laser) = match (measured, table) {
+        (Some(measured), _) => {
+            positioning = measured.positioning;
+            (measured.table, Some((measured.map, measured.told)))
+        }
+        (None, Some(table)) => (table, None),
+        (None, None) => return Err(flag("measurement", ("no table is found".into(), "give a table".into()))),
     };
     let (known, mut told) = match (known, machine) {
         (Some(known), _) => (known, Vec::new()),
@@ -188,7 +216,8 @@ pub fn read(
     }
     let Some(path) = &request.path else {
         let recordings = write::all(&known, &table, machine, &mut told)?;
-        return Ok(Converted { recordings, map: known.map.ron(&told), told, alignment: None });
+        let map = if is_mapped { known.map.ron(&told) } else { String::new() };
+        return Ok(Converted { recordings, map, told, alignment: None, positioning });
     };
     let Some(machine) = machine else {
         let mend = "give the machine that ran it, `--machine MACHINE.ron`";
@@ -198,5 +227,6 @@ pub fn read(
     let followed = follow::follow(&table, known, machine, path, request.sample_rate)?;
     told.extend(followed.told);
     let recordings = write::all(&followed.known, &followed.table, Some(machine), &mut told)?;
-    Ok(Converted { recordings, map: map.ron(&told), told, alignment: Some(followed.alignment) })
+    let alignment = Some(followed.alignment);
+    Ok(Converted { recordings, map: map.ron(&told), told, alignment, positioning: None })
 }

@@ -7,6 +7,7 @@ mod compensation;
 mod control;
 mod curve;
 mod dh;
+mod error_motions;
 mod heidenhain;
 mod iso230;
 mod known;
@@ -36,6 +37,8 @@ pub enum Format {
     Iso230,
     /// Position errors of every joint over its travel, both directions, a CSV table.
     Table,
+    /// The six error motions of every axis over its travel under their names of ISO 230-1, both directions, a CSV table.
+    ErrorMotions,
     /// A robot description, m and rad: a new one, or the origins of [`ExportOptions::base_file`].
     Urdf,
     /// A model of MuJoCo, m and rad: the geometry, joints that follow others, play.
@@ -59,7 +62,7 @@ pub enum Format {
 }
 
 /// All formats with the word that names each.
-pub const FORMATS: [(Format, &str); 12] = [
+pub const FORMATS: [(Format, &str); 13] = [
     (Format::Urdf, "urdf"),
     (Format::Mjcf, "mjcf"),
     (Format::Dh, "dh"),
@@ -71,6 +74,7 @@ pub const FORMATS: [(Format, &str); 12] = [
     (Format::Heidenhain, "heidenhain"),
     (Format::Fanuc, "fanuc"),
     (Format::Iso230, "iso230"),
+    (Format::ErrorMotions, "error-motions"),
     (Format::Table, "table"),
 ];
 
@@ -231,6 +235,7 @@ pub fn export(calibrated: &CalibratedMachine, format: Format, options: &ExportOp
     }
     let mut exported = match format {
         Format::Iso230 => iso230::write(calibrated),
+        Format::ErrorMotions => error_motions::write(calibrated),
         Format::Table => table::write(calibrated),
         Format::Urdf => match &options.base_file {
             Some(base) => urdf::patched(calibrated, &base.file, &base.text, &base.ends),

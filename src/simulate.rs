@@ -58,6 +58,7 @@ inner! {
     use turns::{Sense, Turns, plane_across, plane_of_axes, rest, usual_range};
 }
 pub use faults::Faults;
+pub(crate) use follow::follow;
 pub use instrument::{Instrument, Scatter};
 pub use plant::Plant;
 

@@ -13,7 +13,7 @@ use super::simulate;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Table of another program: text with any separator, .npy, .rtl, .rta
+    /// Table of another program: text with any separator, .npy, .rtl, .rta, .rtx
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Machine whose joints are in the table; what is written is read back with it
@@ -25,7 +25,7 @@ pub(crate) struct Args {
     /// Where to write the map that was found
     #[arg(long, value_name = "MAP.ron")]
     write_map: Option<Output>,
-    /// What was measured: position, pose, joint, distance or displacement
+    /// What was measured: position, pose, joint, distance or displacement; r-test: a ball that linear axes followed while rotary ones turned
     #[arg(long, value_name = "KIND", conflicts_with = "map")]
     measurement: Option<String>,
     /// A column of the recording and the heading (or `#3`, the number) of its column in the table; `q*=Axis *` for all joints
@@ -65,14 +65,14 @@ pub(crate) struct Args {
     /// Readings a second, where such a table has no column of time; found by the path's feed
     #[arg(long, value_name = "RATE", value_parser = rate, requires = "path")]
     sample_rate: Option<f64>,
-    /// The joint that a file of a laser is about
+    /// The joint that a file of a laser or a table of deviations at targets is about
     #[arg(long, value_name = "JOINT")]
     joint: Option<String>,
     /// From which side the targets of a laser were approached, where the file does not tell
     #[arg(long, value_name = "HOW", value_parser = ["alternating", "rising", "falling"])]
     approach: Option<String>,
-    /// What the deviations of a laser are
-    #[arg(long, value_name = "SENSE", value_parser = ["laser-minus-target", "target-minus-laser"])]
+    /// What deviations are: of a laser or at targets the first two, of an R-test the others
+    #[arg(long, value_name = "SENSE", value_parser = ["laser-minus-target", "target-minus-laser", "ball-minus-tool", "tool-minus-ball"])]
     deviation: Option<String>,
     /// What separates columns: comma, semicolon, tab or blanks; found by itself
     #[arg(long, value_name = "WORD", conflicts_with = "map")]
@@ -156,6 +156,15 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
         _ => None,
     };
     let converted = open(&args.file, machine.as_ref(), &args.request(path))?;
+    if args.write_map.is_some() && converted.map.is_empty() {
+        return Err(Failure::Told {
+            what: format!(
+                "{}: no map holds how this table is read: rows and columns change their places",
+                args.file.display()
+            ),
+            mend: "leave --write-map out; the flags of this call say all".into(),
+        });
+    }
     let paths: Vec<PathBuf> = converted.recordings.iter().map(|r| path_of(&args.output, r)).collect();
     // The names of several come from the markers, and are seen only now.
     files.with_outputs("--output", &paths).check()?;
@@ -179,10 +188,13 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
         write(path, &converted.map)?;
     }
     let mut text = String::new();
-    if args.map.is_none() && args.write_map.is_none() {
+    if args.map.is_none() && args.write_map.is_none() && !converted.map.is_empty() {
         text.push_str(&converted.map);
     } else {
         text.extend(converted.told.iter().map(|line| format!("{line}\n")));
+    }
+    if let Some(positioning) = &converted.positioning {
+        text.extend(positioning.in_words().iter().map(|line| format!("{line}\n")));
     }
     for (path, recording) in paths.iter().zip(&converted.recordings) {
         let gaps = match recording.with_gaps {
@@ -206,6 +218,9 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
     let mut result = json!({"recordings": recordings, "map": converted.map, "told": converted.told});
     if let Some(alignment) = &converted.alignment {
         result["alignment"] = json!(alignment);
+    }
+    if let Some(positioning) = &converted.positioning {
+        result["positioning"] = json!(positioning);
     }
     args.common.write_json(&result)
 }

@@ -41,7 +41,7 @@ pub(super) fn map(table: &Table, machine: &Machine, request: &Request) -> Result
 }
 
 /// Columns that the user has named; a star stands for what differs between joints.
-fn named(draft: &mut Draft) -> Result<()> {
+pub(super) fn named(draft: &mut Draft) -> Result<()> {
     for (to, from) in &draft.request.columns {
         let pairs: Vec<(String, String)> = match to.split_once('*') {
             Some((before, behind)) => {
@@ -82,7 +82,7 @@ fn named(draft: &mut Draft) -> Result<()> {
 }
 
 /// The column of time, and its zero where it counts from 1970 or is a date.
-fn time(draft: &mut Draft) {
+pub(super) fn time(draft: &mut Draft) {
     let words = ["t", "time", "timestamp", "stamp", "zeit", "datetime", "clock"];
     if !draft.has("t") {
         let named = |i: &usize| {

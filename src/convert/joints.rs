@@ -129,6 +129,12 @@ fn candidates(draft: &Draft, joint: &str, read: bool) -> Vec<usize> {
 
 /// Takes the commands; what is not found is asked.
 pub(super) fn commands(draft: &mut Draft) {
+    let missing = found(draft);
+    ask(draft, &missing);
+}
+
+/// Takes the commands and their directions of approach; the joints that no column names.
+pub(super) fn found(draft: &mut Draft) -> Vec<String> {
     let mut missing: Vec<String> = Vec::new();
     for joint in draft.machine.commands().to_vec() {
         let is_fixed = |line: &String| {
@@ -154,7 +160,6 @@ pub(super) fn commands(draft: &mut Draft) {
             }
         }
     }
-    ask(draft, &missing);
     for joint in draft.machine.commands().to_vec() {
         let to = format!("{joint}_direction");
         let by_name = |i: &usize| {
@@ -173,10 +178,11 @@ pub(super) fn commands(draft: &mut Draft) {
             draft.take(&to, *column, None);
         }
     }
+    missing
 }
 
 /// Asks for the joints whose names no column has.
-fn ask(draft: &mut Draft, missing: &[String]) {
+pub(super) fn ask(draft: &mut Draft, missing: &[String]) {
     let Some(first) = missing.first() else { return };
     let kind = quantity(first, Some(draft.machine));
     let unit = if kind == Some(Quantity::Angle) { "deg" } else { "mm" };

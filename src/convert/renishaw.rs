@@ -3,15 +3,15 @@
 //! Sections begin with lines `NAME::`. `TARGET DATA::` lists the targets, mm or deg; `DEVIATIONS::` has lines `run target deviation`, in um or
 //! mrad. What stands in other sections is not needed.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::Request;
-use super::heading::Heading;
-use super::map::{Map, Part};
-use super::table::{Row, Table};
+use super::deviations::{Deviations, Measured, is_reversed, joint, senses};
+use super::positioning::Reading;
 use super::text::decoded;
 use crate::error::{Error, Place, Result};
-use crate::machine::{JointKind, Machine};
+use crate::machine::Machine;
 use crate::wording::shown;
 
 /// Whether a file is one of these.
@@ -31,77 +31,40 @@ struct Laser {
     readings: Vec<(usize, usize, usize, f64)>,
 }
 
-/// Direction of approach of the readings.
-#[derive(Clone, Copy, PartialEq)]
-enum Approach {
-    Alternating,
-    Rising,
-    Falling,
-}
-
-/// The table of such a file with its map: command, direction of approach and what the laser read of one joint.
+/// The recording of such a file: command, sense of approach and what the laser read of one joint.
 pub(super) fn read(
     file: &Path,
     bytes: &[u8],
     machine: Option<&Machine>,
     request: &Request,
-) -> Result<(Table, Map, Vec<String>)> {
+) -> Result<Measured> {
     let laser = Laser::read(file, &decoded(bytes))?;
-    let joint = joint(file, &laser, machine, request)?;
-    let approaches = approaches(file, &laser, request)?;
-    let reversed = request.deviation.as_deref() == Some("target-minus-laser");
-    let (unit, per) = if laser.angular { ("deg", 1e-3f64.to_degrees()) } else { ("mm", 1e-3) };
-    let headings = [format!("target [{unit}]"), "approach".into(), format!("laser [{unit}]")];
-    let mut rows = Vec::with_capacity(laser.readings.len());
-    for ((line, _, target, deviation), approach) in laser.readings.iter().zip(approaches) {
-        let target = laser.targets[target - 1];
-        let deviation = if reversed { -deviation } else { *deviation };
-        // Lengths to a tenth of a nanometre, so that sums of decimals stay short.
-        let read = if laser.angular {
-            target + deviation * per
-        } else {
-            ((target + deviation * per) * 1e7).round() / 1e7
-        };
-        let fields = [format!("{target:?}"), approach.to_string(), format!("{read:?}")];
-        rows.push(Row { line: *line, fields: fields.iter().collect() });
+    let joint = joint(file, laser.angular, laser.axis.as_deref(), machine, request)?;
+    let mut runs: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for (_, run, target, _) in &laser.readings {
+        runs.entry(*run).or_default().push(laser.targets[target - 1]);
     }
-    let table = Table {
-        file: file.to_path_buf(),
-        headings: headings.iter().map(|h| Heading::read(h)).collect(),
-        line: 0,
-        rows,
-        separator: None,
-        decimal_comma: false,
+    // Numbers of targets may count down along the axis.
+    let senses = senses(file, &runs, laser.targets.last() >= laser.targets.first(), request)?;
+    let (small, per) = if laser.angular { ("mrad", 1e-3) } else { ("um", 1e-6) };
+    let sign = if is_reversed(request) { -1.0 } else { 1.0 };
+    let reading = |(line, run, target, deviation): &(usize, usize, usize, f64)| Reading {
+        line: *line,
+        run: *run,
+        target: laser.targets[target - 1],
+        from_below: senses.get(run).copied().unwrap_or(true),
+        deviation: sign * deviation * per,
     };
-    let part = |to: String, k: usize, unit: Option<&str>| Part {
-        unit: unit.map(str::to_string),
-        ..Part::new(to, &headings[k])
-    };
-    let map = Map {
-        machine: machine.map(|m| m.name().to_string()),
-        measurement: "joint".into(),
-        head: request.head.clone(),
-        columns: vec![
-            part(joint.clone(), 0, Some(unit)),
-            part(format!("{joint}_direction"), 1, None),
-            part(format!("{joint}_meas"), 2, Some(unit)),
-        ],
-        ..Map::default()
-    };
-    let (small, order) = (
-        if laser.angular { "mrad" } else { "um" },
-        if reversed { "target less laser" } else { "laser less target" },
-    );
-    let mut told = vec![format!(
+    let readings = laser.readings.iter().map(reading).collect();
+    let deviations = Deviations { file: file.to_path_buf(), angular: laser.angular, joint, readings };
+    let mut measured = deviations.measured(machine, request);
+    let unit = if laser.angular { "deg" } else { "mm" };
+    let order = if is_reversed(request) { "target less laser" } else { "laser less target" };
+    let units = format!(
         "targets are read in {unit}, deviations in {small} as {order}; `--deviation` says the other sense"
-    )];
-    if !request.head.iter().any(|line| line.trim_start_matches(['#', ' ']).starts_with("zero")) {
-        told.push(
-            "the laser's zero is taken as the machine's; if it was set somewhere, say --head 'zero: unknown'"
-                .into(),
-        );
-    }
-    Ok((table, map, told))
+    );
+    measured.told.insert(0, units);
+    Ok(measured)
 }
 
 impl Laser {
@@ -180,73 +143,4 @@ impl Laser {
         }
         Ok(laser)
     }
-}
-
-/// The joint that was measured: as told, or the only one of its kind.
-fn joint(file: &Path, laser: &Laser, machine: Option<&Machine>, request: &Request) -> Result<String> {
-    let kind = if laser.angular { JointKind::Revolute } else { JointKind::Prismatic };
-    let noted = laser
-        .axis
-        .as_ref()
-        .map_or(String::new(), |axis| format!("; the operator noted `Axis: {}`", shown(axis)));
-    let of_kind: Vec<String> = machine.map_or(Vec::new(), |m| {
-        let joints = 0..m.commands().len();
-        joints.filter(|c| m.command_joint(*c).kind == kind).map(|c| m.commands()[c].clone()).collect()
-    });
-    let ask = |what: String| {
-        let names = if of_kind.is_empty() { "NAME".to_string() } else { of_kind.join("|") };
-        Err(Error::mistake(Place::file(file), what, format!("--joint {names}{noted}")))
-    };
-    match (&request.joint, machine) {
-        (Some(joint), None) => Ok(joint.clone()),
-        (Some(joint), Some(_)) if of_kind.contains(joint) => Ok(joint.clone()),
-        (Some(joint), Some(_)) => {
-            let is = if laser.angular { "turning" } else { "linear" };
-            ask(format!("`{}` is no {is} joint of the machine", shown(joint)))
-        }
-        (None, Some(m)) if m.commands().len() == 1 && of_kind.len() == 1 => Ok(of_kind[0].clone()),
-        (None, _) => ask("the file does not say which joint of the machine was measured".into()),
-    }
-}
-
-/// Direction of approach of each reading: as told, or as the targets of each run follow each other in the file.
-fn approaches(file: &Path, laser: &Laser, request: &Request) -> Result<Vec<i8>> {
-    let runs: std::collections::BTreeSet<usize> = laser.readings.iter().map(|r| r.1).collect();
-    let rising = |run: usize| -> Option<bool> {
-        let of: Vec<f64> =
-            laser.readings.iter().filter(|r| r.1 == run).map(|r| laser.targets[r.2 - 1]).collect();
-        let all = |up: bool| of.windows(2).all(|p| if up { p[1] > p[0] } else { p[1] < p[0] });
-        match (all(true), all(false)) {
-            (true, false) => Some(true),
-            (false, true) => Some(false),
-            _ => None,
-        }
-    };
-    let told = match request.approach.as_deref() {
-        Some("alternating") => Some(Approach::Alternating),
-        Some("rising") => Some(Approach::Rising),
-        Some("falling") => Some(Approach::Falling),
-        _ => None,
-    };
-    let senses: std::collections::BTreeMap<usize, Option<bool>> =
-        runs.iter().map(|run| (*run, rising(*run))).collect();
-    let both = senses.values().any(|s| *s == Some(true)) && senses.values().any(|s| *s == Some(false));
-    let known = senses.values().all(Option::is_some);
-    if told.is_none() && !(both && known) {
-        let what = format!(
-            "the file does not say from which side the targets of {} runs were approached",
-            runs.len()
-        );
-        let mend = "--approach alternating (run 1 towards higher numbers of targets, run 2 back, ...), rising or falling";
-        return Err(Error::mistake(Place::file(file), what, mend));
-    }
-    // Numbers of targets may count down along the axis.
-    let upward = laser.targets.last() >= laser.targets.first();
-    let sense = |run: usize| match told {
-        Some(Approach::Rising) => true,
-        Some(Approach::Falling) => false,
-        Some(Approach::Alternating) => (run % 2 == 1) == upward,
-        None => senses.get(&run).copied().flatten().unwrap_or(true),
-    };
-    Ok(laser.readings.iter().map(|r| if sense(r.1) { 1 } else { -1 }).collect())
 }

@@ -9,7 +9,9 @@ use super::table::POINTS;
 use super::varying::varying;
 use super::{Exported, Number, Remainder};
 use crate::calibration::CalibratedMachine;
+use crate::effects::StoredSlot;
 use crate::error::Result;
+use crate::feature::Expression;
 use crate::lie::{Mat3, Pose};
 use crate::machine::{Dyad, Joint, JointKind, Machine};
 
@@ -34,10 +36,20 @@ struct Play {
     what: String,
 }
 
+/// A joint with a compliance by weight: a spring between its motor and what it moves, N/m or Nm/rad.
+struct Spring {
+    joint: String,
+    kind: JointKind,
+    stiffness: f64,
+    /// Its name among the effects.
+    what: String,
+}
+
 pub(super) fn write(calibrated: &CalibratedMachine) -> Result<Exported> {
     let machine = calibrated.machine();
     let plays = plays(calibrated)?;
-    let mut exported = told(calibrated, &plays)?;
+    let springs = springs(calibrated, &plays);
+    let mut exported = told(calibrated, &plays, &springs)?;
     let mut text = format!("<!-- {} -->\n", escaped(&heading(machine.name(), "MJCF")));
     exported.told.iter().for_each(|line| {
         let _ = writeln!(text, "<!-- {} -->", escaped(line));
@@ -59,16 +71,17 @@ pub(super) fn write(calibrated: &CalibratedMachine) -> Result<Exported> {
             let _ = writeln!(text, "{:1$}</body>", "", 2 * (2 + depth));
         }
     }
-    for play in &plays {
-        let name = escaped(&play.joint);
+    let motors = plays.iter().map(|play| (&play.joint, play.kind));
+    for (joint, of) in motors.chain(springs.iter().map(|spring| (&spring.joint, spring.kind))) {
+        let name = escaped(joint);
         let _ = writeln!(
             text,
             "    <body name=\"motor of {name}\" gravcomp=\"1\"><joint name=\"motor of {name}\" type=\"{}\" axis=\"1 0 0\"/></body>",
-            kind(play.kind)
+            kind(of)
         );
     }
     text.push_str("  </worldbody>\n");
-    coupled(&mut text, machine, &plays);
+    coupled(&mut text, machine, &plays, &springs);
     text.push_str("</mujoco>\n");
     for play in &plays {
         let unit = if play.kind == JointKind::Revolute { "rad" } else { "m" };
@@ -80,12 +93,21 @@ pub(super) fn write(calibrated: &CalibratedMachine) -> Result<Exported> {
             because: None,
         });
     }
+    for spring in &springs {
+        exported.numbers.push(Number {
+            name: format!("stiffness of {}", spring.joint),
+            value: Some(spring.stiffness),
+            declared: 0.0,
+            unit: if spring.kind == JointKind::Revolute { "Nm/rad" } else { "N/m" }.into(),
+            because: None,
+        });
+    }
     exported.text = text;
     Ok(exported)
 }
 
 /// What is told of the model, and what it does not hold.
-fn told(calibrated: &CalibratedMachine, plays: &[Play]) -> Result<Exported> {
+fn told(calibrated: &CalibratedMachine, plays: &[Play], springs: &[Spring]) -> Result<Exported> {
     let machine = calibrated.machine();
     let mut told = vec![
         "positions of bodies hold the calibrated geometry, zero positions of joints included; m, rad, kg"
@@ -98,6 +120,9 @@ fn told(calibrated: &CalibratedMachine, plays: &[Play]) -> Result<Exported> {
     }
     if !plays.is_empty() {
         told.push("a joint with play hangs on a motor of its own by a coupling that is limited in length; put actuators on the motors".into());
+    }
+    if !springs.is_empty() {
+        told.push("a joint that yields to its weight hangs on a motor of its own by a spring; put actuators on the motors, and damping where it must not ring".into());
     }
     for (j, joint) in machine.joints().filter(|(j, joint)| !is_plain(machine, *j, joint)) {
         let terms = machine.drive(j).map_or(&[][..], |drive| &drive.terms);
@@ -112,7 +137,11 @@ fn told(calibrated: &CalibratedMachine, plays: &[Play]) -> Result<Exported> {
     told.extend(Known::new(calibrated).sentence());
     told.extend(super::known::open_at_tool(calibrated));
     let mut left_out = varying(calibrated, CONSTANT)?;
-    left_out.retain(|left| plays.iter().all(|play| play.what != left.what));
+    let holds = |left: &Remainder| {
+        plays.iter().any(|play| play.what == left.what)
+            || springs.iter().any(|spring| spring.what == left.what)
+    };
+    left_out.retain(|left| !holds(left));
     if !machine.side_branches().is_empty() {
         left_out.push(Remainder {
             what: "side branches of the machine".into(),
@@ -149,6 +178,50 @@ fn plays(calibrated: &CalibratedMachine) -> Result<Vec<Play>> {
     Ok(plays)
 }
 
+/// Joints whose displacement is one number times the pull of the masses that the machine file states: springs, and nothing else. Where play
+/// stands between motor and joint too, nobody has said in which order; masses of side branches are not in the model.
+fn springs(calibrated: &CalibratedMachine, plays: &[Play]) -> Vec<Spring> {
+    let machine = calibrated.machine();
+    let mut springs: Vec<Spring> = Vec::new();
+    for effect in calibrated.effects().iter().filter(|effect| !effect.of_setup) {
+        let Some((j, joint)) = machine.joints().find(|(_, joint)| joint.name == effect.at) else { continue };
+        let taken = plays.iter().map(|play| &play.joint).chain(springs.iter().map(|own| &own.joint));
+        if !is_plain(machine, j, joint)
+            || !machine.side_branches().is_empty()
+            || taken.into_iter().any(|own| *own == effect.at)
+        {
+            continue;
+        }
+        // Without a mass that is stated, the model of the effect counts 1 kg at every frame.
+        let beyond = machine.dyads().iter().enumerate().skip(j);
+        let weighs = beyond
+            .filter(|(k, _)| machine.branch(*k) == machine.branch(j))
+            .any(|(_, dyad)| dyad.mass.is_some_and(|mass| mass.mass > 0.0));
+        let terms: Vec<_> = effect.terms.iter().filter(|term| term.value != 0.0).collect();
+        let [term] = &terms[..] else { continue };
+        let [part] = &term.parts[..] else { continue };
+        let twist = joint.twist();
+        let triple = |v: (f64, f64, f64)| [v.0, v.1, v.2];
+        let along = triple(part.v) == twist.v.0 && triple(part.w) == twist.w.0;
+        let frame = &machine.dyads()[j].frame;
+        let here = matches!(&part.slot, StoredSlot::Before(own) | StoredSlot::After(own) if own == frame);
+        let pull = match &part.feature {
+            Expression::Of(of, feature) => *of == joint.name && **feature == Expression::Gravity,
+            _ => false,
+        };
+        if weighs && along && here && pull && term.value > 0.0 {
+            let what = format!("{} at {}", effect.effect, effect.at);
+            springs.push(Spring {
+                joint: effect.at.clone(),
+                kind: joint.kind,
+                stiffness: term.value.recip(),
+                what,
+            });
+        }
+    }
+    springs
+}
+
 fn body(text: &mut String, dyad: &Dyad, pose: Pose<f64>, depth: usize) {
     let indent = 2 * depth;
     let _ = writeln!(
@@ -183,7 +256,7 @@ fn body(text: &mut String, dyad: &Dyad, pose: Pose<f64>, depth: usize) {
 }
 
 /// Joints that follow others, and those with play.
-fn coupled(text: &mut String, machine: &Machine, plays: &[Play]) {
+fn coupled(text: &mut String, machine: &Machine, plays: &[Play], springs: &[Spring]) {
     let (mut tendons, mut equalities) = (String::new(), String::new());
     for play in plays {
         let (name, half) = (escaped(&play.joint), play.width / 2.0);
@@ -191,6 +264,14 @@ fn coupled(text: &mut String, machine: &Machine, plays: &[Play]) {
             tendons,
             "    <fixed name=\"play of {name}\" limited=\"true\" range=\"{}\" {HARD}><joint joint=\"{name}\" coef=\"1\"/><joint joint=\"motor of {name}\" coef=\"-1\"/></fixed>",
             numbers([-half, half])
+        );
+    }
+    for spring in springs {
+        let name = escaped(&spring.joint);
+        let _ = writeln!(
+            tendons,
+            "    <fixed name=\"compliance of {name}\" springlength=\"0\" stiffness=\"{}\"><joint joint=\"{name}\" coef=\"1\"/><joint joint=\"motor of {name}\" coef=\"-1\"/></fixed>",
+            exact(spring.stiffness)
         );
     }
     for (j, joint) in machine.joints().filter(|(j, joint)| !is_plain(machine, *j, joint)) {

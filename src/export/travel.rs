@@ -10,6 +10,57 @@ const REACH: f64 = 0.25;
 /// Bases of the sequence, one for each command; primes.
 const PRIMES: [usize; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
 
+/// Steps between two points of a table, so that what depends on the way is followed.
+const BETWEEN: usize = 8;
+/// By what part of its range a joint overruns its ends, so that play is taken up before the first point.
+const OVERRUN: f64 = 0.02;
+
+/// The way of one joint through its range, there and back.
+pub(super) struct Passage {
+    /// Every position on the way, m or rad.
+    pub path: Vec<f64>,
+    /// The points that are told, rising.
+    pub positions: Vec<f64>,
+    /// Where on the way they are reached in the positive sense.
+    pub up: Vec<usize>,
+    /// The same in the negative sense.
+    pub down: Vec<usize>,
+}
+
+impl Passage {
+    /// Of a command with so many points.
+    pub fn new(calibrated: &CalibratedMachine, command: usize, points: usize) -> Passage {
+        let (from, to) = range(calibrated, command);
+        let (count, steps) = (points.max(2), (points.max(2) - 1) * BETWEEN);
+        let position = |i: usize| from + (to - from) * i as f64 / steps as f64;
+        let over = OVERRUN * (to - from);
+        let up: Vec<f64> =
+            std::iter::once(from - over).chain((0..=steps).map(position)).chain([to + over]).collect();
+        // Up, down and up again: the first way up has no history.
+        let length = up.len();
+        Passage {
+            path: up.iter().chain(up.iter().rev()).chain(&up).copied().collect(),
+            positions: (0..count).map(|i| position(i * BETWEEN)).collect(),
+            up: (0..count).map(|i| 2 * length + 1 + i * BETWEEN).collect(),
+            down: (0..count).map(|i| 2 * length - 2 - i * BETWEEN).collect(),
+        }
+    }
+}
+
+/// The mean of both directions at the zero of the joint, or at the point of the travel next to it.
+pub(super) fn at_zero(positions: &[f64], forward: &[f64], backward: &[f64]) -> f64 {
+    let mean = |i: usize| 0.5 * (forward[i] + backward[i]);
+    let after = positions.partition_point(|p| *p < 0.0);
+    match after {
+        0 => mean(0),
+        n if n == positions.len() => mean(n - 1),
+        n => {
+            let (a, b) = (positions[n - 1], positions[n]);
+            mean(n - 1) + (mean(n) - mean(n - 1)) * (0.0 - a) / (b - a)
+        }
+    }
+}
+
 /// Range of a command over which errors are told, m or rad: its travel, of a joint that turns on and on one turn.
 pub(super) fn range(calibrated: &CalibratedMachine, command: usize) -> (f64, f64) {
     let machine = calibrated.machine();

@@ -17,7 +17,7 @@ pub(super) fn commands_of(machine: &Machine, kind: JointKind) -> Vec<usize> {
 
 /// Moves the commands `linear` in `q` until the point `point_t` stands at `target_w`, the others held: the point is linear in
 /// them, so that one least-squares step of minimum length is exact. What is left of the gap, m.
-pub(super) fn follow(
+pub(crate) fn follow(
     chain: &Chain<f64>,
     machine: &Machine,
     linear: &[usize],

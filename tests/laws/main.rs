@@ -5,6 +5,8 @@
 mod common;
 #[path = "../mutated/mod.rs"]
 mod mutated;
+#[path = "../signatures/mod.rs"]
+mod signatures_drawn;
 
 mod arrays;
 mod bad_effects;
@@ -14,10 +16,13 @@ mod calibrated;
 mod compensate;
 mod convert;
 mod convert_path;
+mod convert_targets;
 mod effects;
 mod effects_in_files;
 mod export;
 mod export_controls;
+mod export_motions;
+mod export_springs;
 mod features;
 mod import;
 mod import_dh;
@@ -34,4 +39,5 @@ mod nc;
 mod partial;
 mod recordings;
 mod rooms;
+mod signatures;
 mod simulate;
