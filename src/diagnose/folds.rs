@@ -85,7 +85,7 @@ pub(super) fn gain_elsewhere(search: &Search, in_model: &[ModelTerm], i: usize) 
     if motions.len() < 2 {
         return None;
     }
-    Folds::of(search, in_model, owner)?.gain_where_expected(search, i)
+    Folds::of(search, in_model, owner, stretches(search)?)?.gain_where_expected(search, i)
 }
 
 /// Where each joint of a recording has been, least and greatest.
@@ -179,7 +179,7 @@ struct Normal {
 impl Normal {
     fn new(search: &Search, in_model: &[ModelTerm]) -> Option<Self> {
         let rows = search.rows;
-        let fold_of = owners(search)?;
+        let fold_of = stretches(search)?;
         let mut white = rows.linear.constant.clone();
         rows.whiten(&mut white);
         let mut owner = vec![None; white.ncols()];
@@ -226,21 +226,21 @@ impl Normal {
     }
 }
 
-/// The fold of each row.
-fn owners(search: &Search) -> Option<Vec<usize>> {
+/// The stretch of its recording that each row is in; `None` where there are too few rows.
+fn stretches(search: &Search) -> Option<Vec<usize>> {
     let linear = search.rows.linear;
-    let mut owner = vec![0; linear.residual.len()];
+    let mut stretch = vec![0; linear.residual.len()];
     for span in &linear.spans {
         let count = span.samples.1 - span.samples.0;
         if count < 2 * FOLDS {
             return None;
         }
         let rows = span.rows.0..span.rows.1;
-        for (fold, sample) in owner[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
-            *fold = (sample - span.samples.0) * FOLDS / count;
+        for (own, sample) in stretch[rows.clone()].iter_mut().zip(&linear.sample[rows]) {
+            *own = (sample - span.samples.0) * FOLDS / count;
         }
     }
-    Some(owner)
+    Some(stretch)
 }
 
 /// Normal equations of the whitened rows of each fold.
@@ -321,11 +321,12 @@ impl Part {
 impl Folds {
     /// Stretches of every recording; `None` where there are too few rows, or a column cannot be built.
     fn new(search: &Search, told: &[ModelTerm]) -> Option<Self> {
-        Self::of(search, told, owners(search)?)
+        let stretch = stretches(search)?;
+        Self::of(search, told, stretch.clone(), stretch)
     }
 
-    /// `owner`: the fold of each row.
-    fn of(search: &Search, told: &[ModelTerm], owner: Vec<usize>) -> Option<Self> {
+    /// `owner`: the fold of each row; `stretch`: as [`stretches`].
+    fn of(search: &Search, told: &[ModelTerm], owner: Vec<usize>, stretch: Vec<usize>) -> Option<Self> {
         let rows = search.rows;
         let linear = rows.linear;
         let mut raw = linear.constant.clone();
@@ -347,7 +348,7 @@ impl Folds {
         let mut white = raw.clone();
         rows.whiten(&mut white);
         let grams = grams(&white, &rows.residual, &owner);
-        Some(Folds { raw, part, owner, stretch: owners(search)?, grams })
+        Some(Folds { raw, part, owner, stretch, grams })
     }
 
     /// By how much the squares of what is left out fall with effect `i`, in units of their mean without it, and the standard error of that.
@@ -368,7 +369,7 @@ impl Folds {
         Some(self.fall_where(search, (&without, &with), &|row| counts[self.owner[row]]))
     }
 
-    /// By how much whitened squares of a fold would fall with effect `i` on average, were it what all folds together say, (81): what the
+    /// By how much whitened squares of a fold would fall with effect `i` on average, were it what all folds together say, (81a): what the
     /// others do not foretell of it, and what the noise that they have makes of the coefficients.
     fn expected_fall(&self, overdispersion: f64, fold: usize, i: usize) -> Option<f64> {
         let width = self.part.len();
