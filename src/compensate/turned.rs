@@ -4,7 +4,6 @@
 use std::io::Write;
 
 use super::corrector::Correction;
-use super::motion_word::motion_word;
 use super::output::put_bytes;
 use super::pass::Pass;
 use super::position::Position;
@@ -85,7 +84,6 @@ pub(super) fn write(
         put_bytes(making_up.as_bytes(), out)?;
         pass.arrive(block, point, correction)?;
     }
-    debug_assert!(motion_word(block).is_none_or(|word| block.words()[word].number() != Some(0.0)));
     Ok(())
 }
 

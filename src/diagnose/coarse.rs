@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::cells::AllCells;
 use super::linear::Linear;
-use super::panel::{LEVELS, Panel, WIDTH};
+use super::panel::{Panel, WIDTH};
 use crate::effects::Candidate;
 use crate::feature::Samples;
 
@@ -139,7 +139,6 @@ impl Coarse {
         if size > 1 {
             sizes.push(1);
         }
-        debug_assert!(sizes.len() <= LEVELS);
         Coarse {
             levels: sizes.into_iter().map(|size| Level::new(linear, size)).collect(),
             kept: (0..candidates).map(|_| OnceLock::new()).collect(),

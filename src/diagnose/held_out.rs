@@ -98,7 +98,6 @@ impl Model {
             return None;
         }
         let states = search.states_of(effect)?;
-        debug_assert_eq!(states.white, effect.state);
         let numbers = self.solution.rows(self.offsets[i] + effect.columns.ncols(), effect.state.ncols());
         Some(states.sum(search.rows, numbers.as_slice()))
     }

@@ -161,58 +161,6 @@ fn a_closed_pipe_is_no_trouble() {
     }
 }
 
-// Demonstration.
-
-/// Digits of measured numbers as `#`: they may differ in the last place from processor to processor.
-fn redacted(text: &str) -> String {
-    let hide = |text: &str| text.replace(|c: char| c.is_ascii_digit(), "#");
-    let word = |word: &str| {
-        if word.contains('.') && !word.ends_with(".csv") { hide(word) } else { word.to_string() }
-    };
-    let is_measured = |line: &str| line.contains("um/m") || line.contains(" um towards ");
-    let line = |line: &str| match line.contains('±') && line.contains('%') || is_measured(line) {
-        true => hide(line),
-        false => line.split(' ').map(word).collect::<Vec<_>>().join(" "),
-    };
-    text.lines().map(line).collect::<Vec<_>>().join("\n")
-}
-
-#[test]
-fn demo_needs_no_input() {
-    let folder = Folder::new("demo");
-    let in_folder = |args: &[&str]| {
-        let output = Command::new(PROGRAM).args(args).current_dir(&folder.0).output().expect("it runs");
-        assert_eq!((output.status.code(), err(&output).as_str()), (Some(0), ""), "{args:?}");
-        out(&output)
-    };
-    let text = in_folder(&["demo", "--json", "demo.json"]);
-    assert_snapshot!(redacted(&text));
-    assert_eq!(folder.names(), ["demo.json", "kincal_demo.html"], "what it says that it writes");
-    let value = json(&folder.read("demo.json"));
-    let found = |i: usize, key: &str| value["findings"][i][key].as_str().expect("a text").to_string();
-    let mut names: Vec<_> = (0..2).map(|i| (found(i, "effect"), found(i, "at"))).collect();
-    names.sort();
-    let concealed = [("backlash".to_string(), "a".to_string()), ("cyclic_error".into(), "c".into())];
-    assert_eq!(names, concealed, "what was concealed");
-    assert_eq!(value["findings"].as_array().map(Vec::len), Some(2), "and nothing else");
-    let rms = |of: &str| value["rms_m"][of].as_f64().expect("a number");
-    assert!(rms("nominal") > 1e-5 && rms("geometric") > 1e-6 && rms("final") < 6e-7);
-    assert!(folder.read("kincal_demo.html").contains("backlash"));
-}
-
-#[test]
-fn demo_repeats_itself_by_its_seed() {
-    let folder = Folder::new("demo-seeds");
-    let run = |seed: &str| {
-        let report = folder.path("report.html");
-        let text = done(&["demo", "--seed", seed, "--report", &report]);
-        (text, folder.read("report.html"))
-    };
-    let (first, again, other) = (run("2"), run("2"), run("3"));
-    assert!(first == again, "the same seed, the same bytes");
-    assert!(first.0 != other.0 && first.1 != other.1);
-}
-
 // Calibrate and predict.
 
 #[test]
@@ -376,7 +324,6 @@ fn json_goes_to_a_file_or_alone_to_standard_output_and_quiet_says_nothing() {
         vec!["check", MACHINE, "--poses", "1"],
         vec!["calibrate", MACHINE, &rec],
         vec!["predict", &ron, &rec],
-        vec!["demo", "--report", &folder.path("demo.html")],
     ] {
         assert_eq!(done(&[&args[..], &["--quiet"]].concat()), "");
         json(&done(&[&args[..], &["--quiet", "--json", "-"]].concat()));

@@ -6,6 +6,7 @@ mod common;
 mod cli;
 mod compare;
 mod compensate;
+mod demo;
 mod diagnose;
 mod docs_convert;
 mod docs_effects;

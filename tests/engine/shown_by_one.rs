@@ -19,7 +19,7 @@ fn path(machine: &Machine, name: &str, seed: u64, moves: f64, bow: f64) -> Recor
     let mut text = String::from(
         "# measurement: position\n# tool_point[mm]: 0, 0, 0\nt[s],x[mm],y[mm],z[mm],px[mm],py[mm],pz[mm]\n",
     );
-    for k in 0..700 {
+    for k in 0..400 {
         let t = 0.1 * f64::from(k);
         let q = [moves * (rates[0] * t).sin(), 0.1 * (rates[1] * t).sin(), 0.1 * (rates[2] * t).cos()];
         // The machine's order.
