@@ -126,6 +126,26 @@ pub fn diagnose(
     request: &DiagnoseOptions,
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis> {
+    // Threads tell what they do; the one that asked hears of it.
+    let (tell, told) = std::sync::mpsc::channel::<String>();
+    std::thread::scope(|scope| {
+        let search = scope.spawn(move || {
+            // Nobody listens any more only where the other side has panicked.
+            search_all(machine, recordings, library, request, &move |text| drop(tell.send(text.into())))
+        });
+        told.iter().for_each(|text| progress(&text));
+        search.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+/// The same, told of by any thread.
+fn search_all(
+    machine: &Machine,
+    recordings: &[Recording],
+    library: &Library,
+    request: &DiagnoseOptions,
+    progress: &search::Tell,
+) -> Result<Diagnosis> {
     let (whole, machine) = (machine, &as_seen_in(machine, recordings));
     let facts = RecordingFacts::of(machine, recordings)?;
     let candidates = library.candidates(machine, &facts);

@@ -1,6 +1,6 @@
 //! Another way to the same recordings: without the effect that came first, `docs/diagnosis-method.md` (79).
 
-use std::cell::RefCell;
+use std::sync::Mutex;
 
 use super::search::{ENTER, ModelTerm, Search};
 
@@ -29,8 +29,8 @@ impl Search<'_> {
             base: self.base.clone(),
             priors: self.priors.iter().enumerate().map(prior).collect(),
             commonness: self.commonness.clone(),
-            known: RefCell::default(),
-            grounds: RefCell::default(),
+            known: Mutex::default(),
+            grounds: Mutex::default(),
             ..*self
         };
         let mut others = search.run(&[], |_| true);

@@ -4,6 +4,7 @@
 //! not for a second effect; and where the shape would have to be most of it, the name is wrong, `docs/diagnosis-method.md` (66).
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::curves::{column, product};
 use super::marginal::gram;
@@ -163,24 +164,31 @@ impl Columns {
 /// Columns of answers times curves, each of this norm, without the combinations of them that noise hides.
 fn whitened(rows: &Rows, answers: Vec<Vec<f64>>, curves: Vec<Vec<f64>>, amplitude: f64) -> Columns {
     let n = rows.residual.len();
-    let (mut columns, mut made_of) = (Vec::new(), Vec::new());
-    let mut white = vec![0.0; n];
-    for (a, answer) in answers.iter().enumerate() {
-        for (c, curve) in curves.iter().enumerate() {
-            let column: Vec<f64> =
-                answer.iter().zip(&rows.linear.sample).map(|(a, sample)| a * curve[*sample]).collect();
-            rows.whitener.apply(&column, &mut white);
-            let length = white.iter().map(|x| x * x).sum::<f64>().sqrt();
-            if length > 0.0 && length.is_finite() {
-                columns.push(DVector::from_column_slice(&white) * (amplitude / length));
-                made_of.push((a, c, amplitude / length));
+    let mut made_of: Vec<(usize, usize, f64)> =
+        (0..answers.len()).flat_map(|a| (0..curves.len()).map(move |c| (a, c, 0.0))).collect();
+    let mut all = DMatrix::zeros(n, made_of.len());
+    let columns = all.as_mut_slice().par_chunks_mut(n.max(1));
+    columns.zip(&mut made_of).for_each_init(
+        || vec![0.0; n],
+        |plain, (white, (a, c, scale))| {
+            let curve = &curves[*c];
+            for ((plain, answer), sample) in plain.iter_mut().zip(&answers[*a]).zip(&rows.linear.sample) {
+                *plain = answer * curve[*sample];
             }
-        }
+            rows.whitener.apply(plain, white);
+            let length = white.iter().map(|x| x * x).sum::<f64>().sqrt();
+            *scale = if length > 0.0 && length.is_finite() { amplitude / length } else { 0.0 };
+            white.iter_mut().for_each(|x| *x *= *scale);
+        },
+    );
+    let used: Vec<usize> = (0..made_of.len()).filter(|i| made_of[*i].2 > 0.0).collect();
+    if used.len() < made_of.len() {
+        all = all.select_columns(&used);
+        made_of.retain(|(.., scale)| *scale > 0.0);
     }
-    let (white, mixture) = match columns.is_empty() {
+    let (white, mixture) = match made_of.is_empty() {
         true => (DMatrix::zeros(n, 0), DMatrix::zeros(0, 0)),
         false => {
-            let all = DMatrix::from_columns(&columns);
             let mixture = seen(&all);
             (all * &mixture, mixture)
         }

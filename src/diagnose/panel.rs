@@ -4,11 +4,15 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DMatrixView};
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
 
 /// Columns of a panel.
 pub(super) const WIDTH: usize = 8;
 /// Rows that are looked at together: a panel's stay in a core's nearest cache while the other factor's columns pass by.
 const ROWS: usize = 512;
+/// Columns that one thread takes at a time, where a column has so many products to give that others can help.
+const APART: usize = 8;
+const MUCH: usize = 1 << 16;
 /// Blocks of samples of so many sizes, at most, that a panel can be put together in.
 pub(super) const LEVELS: usize = 3;
 
@@ -65,7 +69,20 @@ impl Panel {
 /// Adds `Wᵀ C` of columns that are given for some rows from `first` on and are zero elsewhere; `to`: a row per column of the panels, a column per
 /// column of `C`.
 pub(super) fn add_along(panels: &[Arc<Panel>], first: usize, c: &DMatrixView<f64>, to: &mut DMatrix<f64>) {
+    let wide = to.nrows();
+    if c.ncols() <= APART || c.nrows() * wide < MUCH {
+        return add_some_along(panels, first, c, to.as_mut_slice());
+    }
+    to.as_mut_slice().par_chunks_mut(APART * wide).enumerate().for_each(|(chunk, to)| {
+        let own = c.columns(chunk * APART, to.len() / wide);
+        add_some_along(panels, first, &own, to);
+    });
+}
+
+/// The same of so many columns that one thread does them; `to`: column by column.
+fn add_some_along(panels: &[Arc<Panel>], first: usize, c: &DMatrixView<f64>, to: &mut [f64]) {
     let arch = Arch::new();
+    let wide = panels.len() * WIDTH;
     let columns: Vec<_> = c.column_iter().collect();
     for from in (0..c.nrows()).step_by(ROWS) {
         let count = ROWS.min(c.nrows() - from);
@@ -73,8 +90,8 @@ pub(super) fn add_along(panels: &[Arc<Panel>], first: usize, c: &DMatrixView<f64
             let rows = &panel.rows[first + from..first + from + count];
             let mut add = |k: usize, sums: &[[f64; WIDTH]]| {
                 for (k, sums) in (k..).zip(sums) {
-                    let mut to = to.column_mut(k);
-                    to.as_mut_slice()[p * WIDTH..][..WIDTH].iter_mut().zip(sums).for_each(|(to, x)| *to += x);
+                    let to = &mut to[k * wide + p * WIDTH..][..WIDTH];
+                    to.iter_mut().zip(sums).for_each(|(to, x)| *to += x);
                 }
             };
             let own = |k: usize| &columns[k].as_slice()[from..from + count];
@@ -98,7 +115,7 @@ pub(super) fn take_away(panels: &[Arc<Panel>], along: &DMatrix<f64>, from: &mut 
     let panels: Vec<&[[f64; WIDTH]]> = panels.iter().map(|panel| panel.rows()).collect();
     let own = |k: usize| along.as_slice()[k * along.nrows()..][..along.nrows()].as_chunks().0;
     let rows = from.nrows().max(1);
-    for (chunk, columns) in from.as_mut_slice().chunks_mut(4 * rows).enumerate() {
+    let take = |(chunk, columns): (usize, &mut [f64])| {
         let mut columns: Vec<&mut [f64]> = columns.chunks_mut(rows).collect();
         let (panels, k) = (&panels[..], 4 * chunk);
         match &mut columns[..] {
@@ -109,6 +126,10 @@ pub(super) fn take_away(panels: &[Arc<Panel>], along: &DMatrix<f64>, from: &mut 
                 (k..).zip(rest).for_each(|(k, a)| arch.dispatch(Beside { panels, along: [own(k)], out: [a] }))
             }
         }
+    };
+    match rows * along.nrows() < MUCH {
+        true => from.as_mut_slice().chunks_mut(4 * rows).enumerate().for_each(take),
+        false => from.as_mut_slice().par_chunks_mut(4 * rows).enumerate().for_each(take),
     }
 }
 

@@ -1,5 +1,7 @@
 //! What an effect takes away together with what nobody knows of it: how it was before anybody looked, and its shape.
 
+use rayon::prelude::*;
+
 use super::discrepancy;
 use super::evidence::log_mean_exp;
 use super::score::Field;
@@ -41,14 +43,13 @@ impl Search<'_> {
         let worthy = hypotheses.iter().take_while(|r| r.weight > DISTANT * best.0).count();
         let chosen: Vec<usize> =
             (0..worthy).filter(|i| remembers(&hypotheses[*i])).take(REMEMBERED).collect();
-        for i in chosen {
-            let hypothesis = &mut hypotheses[i];
-            let Some(more) = self.with_state(&self.candidates[hypothesis.candidate], hypothesis, field)
-            else {
-                continue;
-            };
-            ranks[i] = hypothesis.weight + more.evidence.max(0.0);
-            hypothesis.reach = more.reach;
+        let with_state =
+            |i: &usize| self.with_state(&self.candidates[hypotheses[*i].candidate], &hypotheses[*i], field);
+        let more: Vec<Option<WithState>> = chosen.par_iter().map(with_state).collect();
+        for (i, more) in chosen.into_iter().zip(more) {
+            let Some(more) = more else { continue };
+            ranks[i] = hypotheses[i].weight + more.evidence.max(0.0);
+            hypotheses[i].reach = more.reach;
         }
         let mut order: Vec<usize> = (0..hypotheses.len()).collect();
         order.sort_by(|a, b| ranks[*b].total_cmp(&ranks[*a]));

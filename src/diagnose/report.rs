@@ -1,5 +1,7 @@
 //! From what the search took in to what is said: which names hold, what is unexplained, and all figures.
 
+use rayon::prelude::*;
+
 use super::along::along_travel;
 use super::approaches::approaches;
 use super::contained::says_no_more;
@@ -94,11 +96,12 @@ pub(super) fn report(
         _ => {
             let model = Model::new(search, in_model);
             let one = |i| finding(search, in_model, i, &shares, (machine, library), &model);
-            (0..in_model.len()).filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
+            let all = (0..in_model.len()).into_par_iter();
+            all.filter_map(|i| one(i).map(|(finding, named)| (i, finding, named))).collect()
         }
     };
     let mut placebos: Vec<Option<Placebo>> =
-        told.iter().map(|(i, ..)| placebo(search, in_model, *i, machine)).collect();
+        told.par_iter().map(|(i, ..)| placebo(search, in_model, *i, machine)).collect();
     for ((_, finding, _), placebo) in told.iter_mut().zip(&placebos) {
         finding.placebo = placebo
             .as_ref()

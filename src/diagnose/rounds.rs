@@ -1,7 +1,7 @@
 //! One search from the constant geometry to what is said: rounds of judging the noise, of linearising the machine anew, of names.
 
-use std::cell::RefCell;
 use std::collections::HashMap;
+use std::sync::Mutex;
 
 use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
@@ -12,7 +12,7 @@ use super::noise::{self, Noise};
 use super::relinearised;
 use super::report;
 use super::score::Rows;
-use super::search::{ModelTerm, Search};
+use super::search::{ModelTerm, Search, Tell};
 use super::speeds::less_rare;
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Library, RecordingFacts};
@@ -39,7 +39,7 @@ pub(super) struct Case<'a> {
     pub options: CalibrateOptions,
     /// Whether families are proposed for what has no name.
     pub propose: bool,
-    pub progress: &'a dyn Fn(&str),
+    pub progress: &'a Tell,
 }
 
 /// What was said of a case.
@@ -87,8 +87,8 @@ impl Case<'_> {
                 progress,
                 overdispersion: 1.0,
                 in_motion: facts_are_smooth(facts),
-                known: RefCell::default(),
-                grounds: RefCell::default(),
+                known: Mutex::default(),
+                grounds: Mutex::default(),
             };
             let judge = |in_model: &[ModelTerm]| {
                 noise_of(&linear, &report::residual_of(&search, in_model), &runs, &out, facts)
@@ -145,12 +145,8 @@ impl Case<'_> {
                     return Ok(report(&search, &in_model));
                 }
                 // Much is left, as it always is on real machines: the simplest names that stand out from it count.
-                let search = Search {
-                    overdispersion,
-                    known: RefCell::default(),
-                    grounds: RefCell::default(),
-                    ..search
-                };
+                let search =
+                    Search { overdispersion, known: Mutex::default(), grounds: Mutex::default(), ..search };
                 let found = less_rare(&search, search.unfolded(search.run(&in_model, |_| true)));
                 let found = search.moved_together(found);
                 in_model = search.polished(&folds::useful(&search, &found));

@@ -1,9 +1,7 @@
 //! Which effects together explain the recordings best: forward, backward, swaps, each against all candidates.
 
-use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
-use std::rc::Rc;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -92,22 +90,25 @@ pub(super) struct Search<'a> {
     pub priors: Vec<f64>,
     /// Logarithm of how often its family is met at all, 0 for all that are common.
     pub commonness: Vec<f64>,
-    pub progress: &'a dyn Fn(&str),
+    pub progress: &'a Tell,
     /// By how much chance counts as larger than the noise says.
     pub overdispersion: f64,
     /// Whether the recordings follow a path; else they are settled positions, of which the side of approach is known.
     pub in_motion: bool,
     /// Hypotheses that are known, by what has been taken in besides.
-    pub known: RefCell<Known>,
+    pub known: Mutex<Known>,
     /// The last spaces that candidates were judged beside, by what had been taken in, and whether that was by names alone.
-    pub grounds: RefCell<VecDeque<(Ground, Arc<Marginal>)>>,
+    pub grounds: Mutex<VecDeque<(Ground, Arc<Marginal>)>>,
 }
+
+/// Takes what is told of the progress, from any thread.
+pub(super) type Tell = dyn Fn(&str) + Sync;
 
 /// What had been taken in, and whether it stands for its names alone.
 pub(super) type Ground = (Vec<Mark>, bool);
 
 /// Hypotheses by the effect that stood aside, by those that were taken in, and by whether these stand for their names alone.
-pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>, bool), Rc<Vec<Hypothesis>>>;
+pub(super) type Known = HashMap<(Option<usize>, Vec<Mark>, bool), Arc<Vec<Hypothesis>>>;
 
 /// What tells an effect that has been taken in: candidate, coefficients and parameters.
 pub(super) type Mark = (usize, usize, Vec<u64>);
@@ -146,12 +147,12 @@ pub(super) const ENTER: f64 = 8.0;
 
 impl Search<'_> {
     /// Evidence of every candidate beside the effects in the model, better first.
-    pub fn hypotheses(&self, in_model: &[ModelTerm]) -> Rc<Vec<Hypothesis>> {
+    pub fn hypotheses(&self, in_model: &[ModelTerm]) -> Arc<Vec<Hypothesis>> {
         self.known_or(in_model, None, None)
     }
 
     /// Evidence of those that might take the place of effect `i`, beside all others.
-    pub fn rivals_of(&self, in_model: &[ModelTerm], i: usize) -> Rc<Vec<Hypothesis>> {
+    pub fn rivals_of(&self, in_model: &[ModelTerm], i: usize) -> Arc<Vec<Hypothesis>> {
         self.known_or(in_model, Some(i), Some(&in_model[i].near))
     }
 
@@ -160,24 +161,27 @@ impl Search<'_> {
         in_model: &[ModelTerm],
         but: Option<usize>,
         among: Option<&[usize]>,
-    ) -> Rc<Vec<Hypothesis>> {
+    ) -> Arc<Vec<Hypothesis>> {
         let others = in_model.iter().enumerate().filter(|(i, _)| Some(*i) != but);
         let mut marks: Vec<Mark> = others.map(|(_, effect)| effect.mark()).collect();
         marks.sort();
         let (of, hidden) = (but.map(|i| in_model[i].candidate), but.is_some_and(|i| in_model[i].hidden));
-        let mut known = self.known.borrow_mut();
         let key = |of: Option<usize>| (of, marks.clone(), hidden);
-        if let Some(known) = known.get(&key(None)).or_else(|| known.get(&key(of))) {
-            return known.clone();
-        }
-        let hypotheses = Rc::new(self.compare(self.ground(in_model, but), among));
-        known.insert(key(among.and(of)), hypotheses.clone());
-        hypotheses
+        // Never held while other work is done: a thread may take another's up meanwhile.
+        let known = || self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = {
+            let known = known();
+            known.get(&key(None)).or_else(|| known.get(&key(of))).cloned()
+        };
+        before.unwrap_or_else(|| {
+            let hypotheses = Arc::new(self.compare(self.ground(in_model, but), among));
+            known().insert(key(among.and(of)), hypotheses.clone());
+            hypotheses
+        })
     }
 
     pub(super) fn compare(&self, marginal: Arc<Marginal>, among: Option<&[usize]>) -> Vec<Hypothesis> {
         let field = self.rows.field(marginal);
-        // What progress is told is no matter of the threads.
         let (rows, priors, candidates, overdispersion) =
             (self.rows, &self.priors, self.candidates, self.overdispersion);
         let all: Vec<usize> = among.map_or_else(|| (0..candidates.len()).collect(), <[usize]>::to_vec);
@@ -207,9 +211,9 @@ impl Search<'_> {
                 .filter(|i| hypotheses[*i].reach / overdispersion > SIMILAR * most)
                 .take(SHAPED)
                 .collect();
-            for i in alike {
-                hypotheses[i].weight = self.with_shape(&hypotheses[i], &field);
-            }
+            let weights: Vec<f64> =
+                alike.par_iter().map(|i| self.with_shape(&hypotheses[*i], &field)).collect();
+            alike.iter().zip(weights).for_each(|(i, weight)| hypotheses[*i].weight = weight);
             let slack = (UNKNOWN_SHAPE * most).min(VISIBLE * rows.whitener.count() as f64 / overdispersion);
             for hypothesis in &mut hypotheses[..close] {
                 let bent = ((most - hypothesis.reach / overdispersion) / (BENT * most)).clamp(0.0, 1.0);
@@ -264,15 +268,17 @@ impl Search<'_> {
         let others = all_but(in_model, but);
         let hidden = but.is_some_and(|i| in_model[i].hidden);
         let marks = (others.iter().map(ModelTerm::mark).collect(), hidden);
-        if let Some((_, known)) = self.grounds.borrow().iter().find(|(of, _)| *of == marks) {
-            return known.clone();
+        let grounds = || self.grounds.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = grounds().iter().find(|(of, _)| *of == marks).map(|(_, known)| known.clone());
+        if let Some(known) = before {
+            return known;
         }
         let is_misshapen = |others: &[ModelTerm]| self.shares(others).is_misshapen(others.len());
         let ground = Arc::new(match hidden || !others.is_empty() && is_misshapen(&others) {
             true => self.beside_names(&others),
             false => self.beside(&others, None),
         });
-        let mut grounds = self.grounds.borrow_mut();
+        let mut grounds = grounds();
         grounds.push_front((marks, ground.clone()));
         grounds.truncate(GROUNDS);
         ground

@@ -1,6 +1,7 @@
 //! Rows that depend on the ones before them, turned into independent ones, `docs/diagnosis-method.md` (61).
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::noise::Noise;
 
@@ -21,6 +22,8 @@ pub(super) struct Whitener {
     pub out: Vec<bool>,
 }
 
+/// More columns than these are given to several threads.
+const FEW: usize = 8;
 const NONE: u32 = u32::MAX;
 /// Noise that remembers less than this is as good as white.
 const FORGETFUL: f64 = 0.2;
@@ -78,7 +81,7 @@ impl Whitener {
     pub fn apply_all(&self, columns: &mut DMatrix<f64>) {
         let rows = columns.nrows().max(1);
         let mut white = DMatrix::zeros(columns.nrows(), columns.ncols());
-        for (own, to) in columns.as_slice().chunks(4 * rows).zip(white.as_mut_slice().chunks_mut(4 * rows)) {
+        let each = |(own, to): (&[f64], &mut [f64])| {
             let own: Vec<&[f64]> = own.chunks(rows).collect();
             let mut to: Vec<&mut [f64]> = to.chunks_mut(rows).collect();
             match (&own[..], &mut to[..]) {
@@ -87,6 +90,11 @@ impl Whitener {
                 }
                 (own, to) => own.iter().zip(to).for_each(|(own, to)| self.apply(own, to)),
             }
+        };
+        let (own, to) = (columns.as_slice(), white.as_mut_slice());
+        match columns.ncols() > FEW {
+            true => own.par_chunks(4 * rows).zip(to.par_chunks_mut(4 * rows)).for_each(each),
+            false => own.chunks(4 * rows).zip(to.chunks_mut(4 * rows)).for_each(each),
         }
         *columns = white;
     }
