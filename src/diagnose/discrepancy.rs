@@ -82,10 +82,10 @@ pub(super) fn initial_conditions(
         }
     }
     // Machines that stand before a recording may have turned round just there.
-    let turned: Vec<Samples> = stretches.iter().map(Samples::turned_before).collect();
+    let turned = rows.linear.turned_before();
     for feature in candidate.features.iter().filter(|f| f.needs_history()) {
         let parameters = &in_model.score.parameters;
-        let (with, without) = (feature.over(&turned, parameters), feature.over(stretches, parameters));
+        let (with, without) = (feature.over(turned, parameters), feature.over(stretches, parameters));
         let change: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
         let (mut first, mut lengths) = (0, Vec::new());
         for stretch in stretches {
@@ -376,20 +376,19 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64
                 let direction = column(stretches, *j, |c| &c.direction);
                 let since = column(stretches, *j, |c| &c.since_reversal);
                 let range = extent(&column(stretches, *j, |c| &c.position));
-                curves.extend((0..=4).map(|n| product(&direction, &chebyshev(n, &position))));
+                curves.extend(chebyshev(4, &position).iter().map(|t| product(&direction, t)));
                 for part in DECAYS {
                     let decay: Vec<f64> =
                         since.iter().map(|s| (-s / (part * range)).max(-200.0).exp()).collect();
                     curves.push(product(&direction, &decay));
                 }
             } else if !rates && !is_wave {
-                curves.extend((1..=CURVE).map(|n| chebyshev(n, &position)));
+                curves.extend(chebyshev(CURVE, &position).drain(1..));
             }
             // Its strength may differ along the way.
             if !is_wave || history {
-                for f in &own {
-                    curves.extend((1..=WANDER).map(|n| product(f, &chebyshev(n, &position))));
-                }
+                let wander = chebyshev(WANDER, &position);
+                curves.extend(own.iter().flat_map(|f| wander[1..].iter().map(|t| product(f, t))));
             }
         }
     }
@@ -397,10 +396,10 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64
         let clock: Vec<f64> = stretches.iter().flat_map(|s| s.time.clone().unwrap_or_default()).collect();
         let clock = rescaled(&clock);
         if clock.len() == rows.linear.lines.len() {
-            curves.extend((1..=CURVE).map(|n| chebyshev(n, &clock)));
-            for f in &own {
-                curves.extend((1..=WANDER).map(|n| product(f, &chebyshev(n, &clock))));
-            }
+            let course = chebyshev(CURVE, &clock);
+            let wander = &course[1..=WANDER];
+            let wandering = own.iter().flat_map(|f| wander.iter().map(|t| product(f, t)));
+            curves.extend(course[1..].iter().cloned().chain(wandering));
         }
     }
     curves
@@ -431,6 +430,12 @@ fn absolute(x: &[f64]) -> Vec<f64> {
     x.iter().map(|x| x.abs()).collect()
 }
 
-fn chebyshev(n: usize, x: &[f64]) -> Vec<f64> {
-    x.iter().map(|x| (n as f64 * x.clamp(-1.0, 1.0).acos()).cos()).collect()
+/// Chebyshev polynomials of orders 0 to `last`, by their recurrence.
+fn chebyshev(last: usize, x: &[f64]) -> Vec<Vec<f64>> {
+    let mut all = vec![vec![1.0; x.len()], x.to_vec()];
+    for n in 2..=last {
+        let next = |k: usize| 2.0 * x[k] * all[n - 1][k] - all[n - 2][k];
+        all.push((0..x.len()).map(next).collect());
+    }
+    all
 }

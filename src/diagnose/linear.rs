@@ -1,6 +1,8 @@
 //! The calibrated machine as a linear model around its optimum: residuals, and how each reading answers to a small twist of every
 //! frame, before and behind its joint. What a diagnosis works on.
 
+use std::sync::OnceLock;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::Result;
@@ -63,6 +65,8 @@ pub(super) struct Linear {
     pub constant: DMatrix<f64>,
     /// What features see, one stretch a recording.
     pub samples: Vec<Samples>,
+    /// The same as if every joint had turned round just before, once it has been asked for.
+    turned: OnceLock<Vec<Samples>>,
     /// Every so manieth sample of the recordings was taken, of so many.
     pub every: u64,
     pub all_samples: u64,
@@ -108,6 +112,11 @@ pub(super) fn linear(
 }
 
 impl Linear {
+    /// What features see of joints that have turned round just before each stretch.
+    pub fn turned_before(&self) -> &[Samples] {
+        self.turned.get_or_init(|| self.samples.iter().map(Samples::turned_before).collect())
+    }
+
     /// Step to which readings of lengths, or of angles, are rounded, as its root mean square over rows, m or rad.
     pub fn step(&self, angle: bool) -> f64 {
         let rows = |span: &Span| (span.rows.1 - span.rows.0) as f64;
@@ -223,6 +232,7 @@ fn rows(
         carried: DMatrix::zeros(count, 6 * dyads),
         constant: DMatrix::zeros(count, columns.count()),
         samples: Vec::new(),
+        turned: OnceLock::new(),
         every,
         all_samples: sources.samples(),
         tolerated: vec![(None, 0.0); columns.count()],
