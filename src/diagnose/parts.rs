@@ -91,6 +91,12 @@ impl Unnamed {
         Unnamed { library, candidates, first, coarse }
     }
 
+    /// Whether two candidates of its library move what they sit on in the same directions, as all terms of one family do.
+    pub fn moves_alike(&self, a: &Candidate, b: &Candidate) -> bool {
+        let (a, b) = (&self.library.families()[a.family], &self.library.families()[b.family]);
+        a.directions == b.directions && a.pivot == b.pivot
+    }
+
     /// The rows of a search, for these candidates.
     pub fn rows<'a>(&'a self, search: &Search<'a>) -> Rows<'a> {
         Rows::new(search.rows.linear, &self.coarse, search.rows.whitener.clone())

@@ -14,7 +14,8 @@ use super::names::LikelyName;
 use super::parts::{TRIES, Unnamed, is_foretold};
 use super::search::{ENTER, ModelTerm, Search};
 use crate::effects::{
-    Directions, Family, Library, LookAlike, Meaning, Output, Partner, Place, RecordingFacts, Seat, Size,
+    Candidate, Directions, Family, Library, LookAlike, Meaning, Output, Partner, Place, RecordingFacts, Seat,
+    Size,
 };
 use crate::feature::Expression;
 use crate::machine::{JointKind, Machine};
@@ -146,10 +147,14 @@ fn law(
         let taken = &laws.candidates[term.candidate];
         open.retain(|c| {
             let other = &laws.candidates[*c];
-            // A family has one other joint.
+            // A family has one other joint and one kind of motion, and grids of several terms would multiply.
             let is_third =
                 matches!((taken.place, other.place), (Place::Pair(_, k), Place::Pair(_, l)) if k != l);
-            other.effect != taken.effect && !is_third
+            let has_grid = |c: &Candidate| !c.parameters.is_empty();
+            other.effect != taken.effect
+                && !is_third
+                && laws.moves_alike(taken, other)
+                && !(has_grid(taken) && has_grid(other))
         });
         all.push(term);
         // What came later may say what was said before.
@@ -188,7 +193,8 @@ impl Draft<'_> {
         })
     }
 
-    /// Terms at one place by what one family can say: one kind of motion, one other joint, every parameter once.
+    /// Terms at one place by what one family can say: one kind of motion, one other joint. One with parameters is a family of its own: over
+    /// their grid everything else in it would be built again and again.
     fn together(&self, terms: &[ModelTerm]) -> Vec<Vec<ModelTerm>> {
         let mut sets: Vec<Vec<ModelTerm>> = Vec::new();
         for term in terms {
@@ -196,14 +202,12 @@ impl Draft<'_> {
             let partner = self.partner(std::slice::from_ref(term));
             let goes_with = |set: &[ModelTerm]| {
                 let alike = |other: &Family| other.directions == own.directions && other.pivot == own.pivot;
-                let has = |other: &Family| {
-                    own.parameters.iter().any(|p| other.parameters.iter().any(|q| q.name == p.name))
-                };
                 let families = || set.iter().map(|other| self.family_of(other));
                 let of_set = self.partner(set);
                 (of_set.is_none() || partner.is_none() || of_set == partner)
                     && families().all(alike)
-                    && !families().any(has)
+                    && own.parameters.is_empty()
+                    && families().all(|other| other.parameters.is_empty())
             };
             match sets.iter_mut().find(|set| goes_with(set)) {
                 Some(set) => set.push(term.clone()),

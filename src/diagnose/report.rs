@@ -137,6 +137,9 @@ pub(super) fn report(
     let mut told: Vec<Told> = (told.into_iter().zip(placebos).zip(kept))
         .map(|(((_, finding, named), placebo), term)| Told { term, finding, named, placebo })
         .collect();
+    // Names that explain most of what is there stand; what they leave may be foretold all the same.
+    let is_rest = doubt.is_none() && !told.is_empty() && shares.left.beyond > CHANCE;
+    let doubt = doubt.or_else(|| is_rest.then(|| Doubt::of(shares.left.energy)));
     // What has no name as it is, is modelled all the same, and then asked for its name.
     let unnamed = doubt.as_ref().map(|_| Unnamed::beside(search, machine, facts));
     let wide = unnamed.as_ref().map(|unnamed| unnamed.rows(search));
@@ -155,6 +158,7 @@ pub(super) fn report(
             && folds::remaining(search, &all, known.len()).is_some_and(|part| part <= HALF);
         let (naming, only_told) = match is_modelled {
             true => (naming, Vec::new()),
+            false if is_rest => (naming.withdrawn(), Vec::new()),
             false => (naming.withdrawn(), modelled.into_iter().chain(only_told).collect()),
         };
         for k in 0..naming.told.len() {
@@ -189,7 +193,7 @@ pub(super) fn report(
             parts = shown;
         }
         let found = search.beside_names(&known);
-        let is_named = is_proved || !naming.told.is_empty();
+        let is_named = is_rest || is_proved || !naming.told.is_empty();
         let doubt = match is_named {
             true => still(search, &found, doubt, !shown_parts.is_empty()),
             false => Some(doubt),
@@ -346,8 +350,12 @@ struct Doubt {
 }
 
 impl Doubt {
+    fn of(energy: f64) -> Self {
+        Doubt { place: None, with: None, energy, but: None }
+    }
+
     fn at(place: Place, energy: f64) -> Self {
-        Doubt { place: Some(place), with: None, energy, but: None }
+        Doubt { place: Some(place), ..Doubt::of(energy) }
     }
 
     fn standing(series: &Standing) -> Self {
@@ -381,7 +389,7 @@ fn doubt(
             && surprise > SURPRISE * memory * total;
     if is_unexplained {
         let energy = search.leftover(&search.base).energy.max(left.energy);
-        return Some(Doubt { place: patched, with: None, energy, but: None });
+        return Some(Doubt { place: patched, ..Doubt::of(energy) });
     }
     if let Some((series, but)) = outbid(search, in_model, machine) {
         return Some(Doubt { but, ..Doubt::standing(&series) });
