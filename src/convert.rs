@@ -6,6 +6,7 @@
 mod align;
 mod capture;
 mod cell;
+mod columns;
 mod deviations;
 mod draft;
 mod follow;
@@ -23,6 +24,7 @@ mod npy;
 mod plan;
 mod positioning;
 mod r_test;
+mod recorded;
 mod renishaw;
 mod rotation;
 mod shapes;
@@ -45,6 +47,7 @@ pub use nominal::Nominal;
 pub use positioning::{BothWays, OneWay, Positioning};
 pub use write::Written;
 
+use crate::columnar::{Form, START};
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
 use map::Known;
@@ -99,7 +102,8 @@ pub struct Request {
 pub struct Converted {
     /// One for each marker.
     pub recordings: Vec<Written>,
-    /// The map that made them, as a file; empty where the table was not read column by column: deviations at targets, an R-test.
+    /// The map that made them, as a file; empty where the table was not read column by column: deviations at targets, an R-test, what is a
+    /// recording already.
     pub map: String,
     /// What was guessed or left out, one sentence each.
     pub told: Vec<String>,
@@ -151,6 +155,15 @@ pub fn read(
     let flag = |name: &str, (what, mend): (String, String)| {
         Error::mistake(Place::file(file), format!("--{name}: {what}"), mend)
     };
+    let form = Form::of_file(file, &bytes[..bytes.len().min(START)])?;
+    // Where something is told of it, a recording is a table as any other.
+    if *request == Request::default()
+        && let Some(recording) = recorded::read(file, bytes, form, machine)?
+    {
+        let told = vec!["it is a recording already, and stays as it is".to_string()];
+        let (map, recordings) = (String::new(), vec![recording]);
+        return Ok(Converted { recordings, map, told, alignment: None, positioning: None });
+    }
     let known = request.map.as_ref().map(|path| Known::open(path)).transpose()?;
     let told = match &known {
         Some(known) => {
@@ -170,7 +183,13 @@ pub fn read(
     let is_r_test = known.is_none() && request.measurement.as_deref() == Some(r_test::WORD);
     // A map says everything, and columns that are named make a table of their own.
     let is_free = known.is_none() && request.columns.is_empty() && request.path.is_none() && !is_r_test;
-    let (table, measured) = if renishaw::is_one(file, bytes) {
+    let (table, measured) = if let Some(form) = form {
+        let (table, text) = columns::read(file, bytes, form, &told)?;
+        match targets::head(&text, &told).filter(|_| is_free) {
+            Some(head) => (None, Some(targets::read(file, &text, &head, machine, request)?)),
+            None => (Some(table), None),
+        }
+    } else if renishaw::is_one(file, bytes) {
         (None, Some(renishaw::read(file, bytes, machine, request)?))
     } else if capture::is_one(file, bytes) {
         (Some(capture::read(file, bytes, &told)?), None)

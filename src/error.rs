@@ -151,7 +151,9 @@ impl Error {
         Error::input(place, Mistake { what: what.into(), mend: mend.into() })
     }
 
+    /// What a reader of bytes has to say of them beyond what the system says passes as it is.
     pub(crate) fn file(path: impl AsRef<Path>, source: std::io::Error) -> Self {
-        Error::File { path: path.as_ref().to_path_buf(), source }
+        let path = path.as_ref().to_path_buf();
+        source.downcast::<Error>().unwrap_or_else(|source| Error::File { path, source })
     }
 }

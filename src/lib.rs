@@ -34,6 +34,7 @@
 //! | [`chain`] | poses and Jacobian rows of a machine with given deviations |
 //! | `sensor` | what instruments read, and how that depends on every unknown |
 //! | `check` | every Jacobian against forward-mode autodiff |
+//! | `columnar` | tables in columns, Parquet and Arrow, as text and back (feature `columnar`) |
 //! | [`recording`] | CSV recordings, streamed |
 //! | `motion` | directions of travel, velocities, the history of a path |
 //! | `feature` | what a deviation depends on, as a number for each sample |
@@ -118,6 +119,7 @@ pub mod check;
 pub mod circular;
 #[cfg(feature = "cli")]
 mod cli;
+mod columnar;
 pub mod compensate;
 #[cfg(feature = "import")]
 pub mod convert;

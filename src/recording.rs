@@ -21,6 +21,7 @@ mod arrays;
 mod call;
 mod chunk;
 mod column;
+mod columns;
 mod entry;
 mod fault;
 mod header;
@@ -45,6 +46,9 @@ inner! {
 pub use arrays::Arrays;
 pub use call::open_all;
 pub use column::Channel;
+#[cfg(feature = "cli")]
+pub(crate) use columns::Columns;
+pub use columns::bytes_of;
 pub use fault::RecordingFault;
 pub use header::{Header, Measurement, NominalLength, Sigma, ToolPoint};
 pub use join::{Joined, join};
@@ -53,10 +57,11 @@ pub(crate) use step::step_of;
 
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{Cursor, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use crate::columnar::{Form, Input, START, Text};
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
 use column::Layout;
@@ -118,20 +123,31 @@ enum Source {
 }
 
 impl Source {
-    /// From byte `offset` on.
+    /// From byte `offset` on; of a table in columns, from this byte of its text on.
     fn read_from(&self, path: &Path, offset: u64) -> Result<Box<dyn Read + Send>> {
+        let failed = |e: io::Error| Error::file(path, e);
         match self {
             Source::Bytes(bytes) => {
+                if let Some(form) = Form::of(path, &bytes[..bytes.len().min(START)])? {
+                    return in_columns(path, form, Input::Bytes(bytes.clone()), offset);
+                }
                 let mut cursor = Cursor::new(bytes.clone());
                 cursor.set_position(offset);
                 Ok(Box::new(cursor))
             }
             Source::File => {
-                let mut file = File::open(path).map_err(|e| Error::file(path, e))?;
-                if offset > 0 {
-                    file.seek(SeekFrom::Start(offset)).map_err(|e| Error::file(path, e))?;
+                let mut file = File::open(path).map_err(failed)?;
+                let mut start = Vec::with_capacity(START);
+                file.by_ref().take(START as u64).read_to_end(&mut start).map_err(failed)?;
+                if let Some(form) = Form::of_file(path, &start)? {
+                    return in_columns(path, form, Input::File(file), offset);
                 }
-                Ok(Box::new(file))
+                if offset > 0 {
+                    file.seek(SeekFrom::Start(offset)).map_err(failed)?;
+                    return Ok(Box::new(file));
+                }
+                // What has been looked at comes again, also from a pipe.
+                Ok(Box::new(Cursor::new(start).chain(file)))
             }
         }
     }
@@ -336,6 +352,17 @@ impl From<Fail> for Halt {
     fn from(fail: Fail) -> Self {
         Halt::Fail(fail)
     }
+}
+
+/// The text of a table in columns, from a byte of it on.
+fn in_columns(path: &Path, form: Form, mut input: Input, offset: u64) -> Result<Box<dyn Read + Send>> {
+    let failed = |e: io::Error| Error::file(path, e);
+    if let Input::File(file) = &mut input {
+        file.rewind().map_err(failed)?;
+    }
+    let mut text = Text::open(path, form, input)?;
+    io::copy(&mut text.by_ref().take(offset), &mut io::sink()).map_err(failed)?;
+    Ok(Box::new(text))
 }
 
 /// Reads up to and including the header row.

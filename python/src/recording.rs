@@ -134,9 +134,10 @@ impl Recording {
         &self.text
     }
 
-    /// Writes that file.
+    /// Writes that file; in columns where its name says so.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let written = std::fs::write(&path, &self.text);
+        let bytes = kincal::recording::bytes_of(&path, &self.text).map_err(|error| of_error(py, &error))?;
+        let written = std::fs::write(&path, bytes);
         written.map_err(|source| of_error(py, &kincal::Error::File { path, source }))
     }
 

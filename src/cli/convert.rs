@@ -1,5 +1,6 @@
 //! `kincal convert`
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use crate::convert::{Nominal, Request, Written, open};
@@ -8,12 +9,12 @@ use serde_json::json;
 
 use super::Common;
 use super::files::{Files, Output};
-use super::output::{Failure, Outcome, count, open_machine, write_whole};
+use super::output::{Failure, Outcome, count, open_machine, write_recording, write_whole};
 use super::simulate;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Table of another program: text with any separator, .npy, .rtl, .rta, .rtx
+    /// Table of another program: text with any separator, .npy, .parquet, .arrow, .rtl, .rta, .rtx; or a recording
     #[arg(value_name = "FILE")]
     file: PathBuf,
     /// Machine whose joints are in the table; what is written is read back with it
@@ -80,7 +81,7 @@ pub(crate) struct Args {
     /// Decimal sign: point or comma; found by itself
     #[arg(long, value_name = "WORD", conflicts_with = "map")]
     decimal: Option<String>,
-    /// Where to write the recording; of several markers each gets its name: REC_MARKER.csv
+    /// Where to write the recording, as a table in columns where it ends in .parquet or .arrow; of several markers each gets its name: REC_MARKER.csv
     #[arg(short, long, value_name = "REC.csv")]
     output: Output,
     #[command(flatten)]
@@ -159,7 +160,7 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
     if args.write_map.is_some() && converted.map.is_empty() {
         return Err(Failure::Told {
             what: format!(
-                "{}: no map holds how this table is read: rows and columns change their places",
+                "{}: no map holds how this table is read: it is a recording already, or rows and columns change their places",
                 args.file.display()
             ),
             mend: "leave --write-map out; the flags of this call say all".into(),
@@ -174,18 +175,16 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
             mend: "take one by `--marker`, or rename them in a map".into(),
         });
     }
-    let write = |path: &Path, text: &str| {
-        write_whole(path, |out| {
-            // Watched: an error here is told of the output.
-            let _ = out.write_all(text.as_bytes());
-            Ok(())
-        })
+    let put = |out: &mut dyn Write, text: &str| {
+        // Watched: an error here is told of the output.
+        let _ = out.write_all(text.as_bytes());
+        Ok(())
     };
     for (path, recording) in paths.iter().zip(&converted.recordings) {
-        write(path, &recording.text)?;
+        write_recording(path, |out| put(out, &recording.text))?;
     }
     if let Some(path) = &args.write_map {
-        write(path, &converted.map)?;
+        write_whole(path, |out| put(out, &converted.map))?;
     }
     let mut text = String::new();
     if args.map.is_none() && args.write_map.is_none() && !converted.map.is_empty() {

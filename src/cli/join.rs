@@ -6,7 +6,7 @@ use crate::recording::join;
 
 use super::Common;
 use super::files::Output;
-use super::output::{Outcome, count, write_whole};
+use super::output::{Outcome, count, write_recording};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -28,7 +28,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let joined = join(&args.recording, &args.other, &args.name)?;
-    write_whole(&args.output, |out| {
+    write_recording(&args.output, |out| {
         // Watched: an error here is told of the output.
         let _ = out.write_all(joined.text.as_bytes());
         Ok(())

@@ -4,9 +4,10 @@ use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::columnar::Form;
 use crate::error::{Error, Place};
 use crate::machine::{Machine, shipped};
-use crate::recording::{Recording, RecordingFault, open_all};
+use crate::recording::{Columns, Recording, RecordingFault, open_all};
 use indicatif::ProgressBar;
 
 use super::Common;
@@ -233,6 +234,26 @@ pub(crate) fn write_checked<T>(
     check(part.path(), &told)?;
     part.finish(&target).map_err(failed)?;
     Ok(told)
+}
+
+/// As [`write_whole`], of a recording: `write` gives it as text, and the name of the file says what it becomes.
+pub(crate) fn write_recording<T>(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> crate::error::Result<T>,
+) -> Outcome<T> {
+    let Some(form) = Form::named(path) else {
+        return write_checked(path, write, |_, _| Ok(()));
+    };
+    // Before anything is reckoned that nothing would write.
+    let mut columns = Columns::new(path, form)?;
+    let in_columns = |out: &mut dyn Write| {
+        let told = write(&mut columns)?;
+        let bytes = columns.finish()?;
+        // Watched: an error here is told of the output.
+        let _ = out.write_all(&bytes);
+        Ok(told)
+    };
+    write_checked(path, in_columns, |_, _| Ok(()))
 }
 
 /// A spinner on standard error while something lasts; gone when it is dropped.

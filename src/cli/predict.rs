@@ -10,7 +10,7 @@ use crate::predict::{Beyond, Prediction, predict};
 use super::Common;
 use super::files::Output;
 use super::keep::Keep;
-use super::output::{Failure, Kind, Outcome, count, open_machine, open_recordings, write_checked};
+use super::output::{Failure, Kind, Outcome, count, open_machine, open_recordings, write_recording};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     };
     let prediction = match &args.output {
         None => predicted(None)?,
-        Some(path) => write_checked(path, |out| predicted(Some(out)), |_, _| Ok(()))?,
+        Some(path) => write_recording(path, |out| predicted(Some(out)))?,
     };
     drop(progress);
     let mut text = render(&prediction, recordings[0].name());

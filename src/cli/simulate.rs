@@ -14,7 +14,7 @@ use crate::simulate::{Session, Style, Written};
 use serde_json::json;
 
 use super::files::Files;
-use super::output::{Kind, Outcome, count, length, open_machine, table, write_whole};
+use super::output::{Kind, Outcome, count, length, open_machine, table, write_recording, write_whole};
 pub(crate) use args::Args;
 use args::DropAs;
 use build::{Built, build, usage};
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Args, named: &Files) -> Outcome {
     for file in &files {
         let mut rows = 0u64;
         let mut written = None;
-        write_whole(file, |out| {
+        write_recording(file, |out| {
             written = session.record(out, |_| {
                 rows += 1;
                 if rows.is_multiple_of(20_000) {

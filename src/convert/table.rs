@@ -107,7 +107,7 @@ impl Table {
     }
 
     /// With names that were told; a table must have some.
-    fn named(mut self, names: &[String], columns: usize) -> Result<Table> {
+    pub fn named(mut self, names: &[String], columns: usize) -> Result<Table> {
         let place = Place::at(&self.file, self.line, 0);
         if !names.is_empty() {
             if names.len() != columns {

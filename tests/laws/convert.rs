@@ -387,6 +387,46 @@ fn arrays_of_numpy_are_tables() {
     assert!(read("a.npy", &word, Some(&axis), &names).is_err());
 }
 
+/// A build without the readers knows such files, and says how to go on.
+#[cfg(not(feature = "columnar"))]
+#[test]
+fn tables_in_columns_are_known_where_nothing_reads_them() {
+    let scara = machine("scara");
+    let says = |file: &str, start: &[u8]| {
+        let error = read(file, start, Some(&scara), &Request::default()).expect_err("no reader");
+        format!("{error}\n  = {}", error.mend())
+    };
+    assert_eq!(
+        says("a.parquet", b"PAR1\x15\x04"),
+        "a.parquet: this is a Parquet file, which this build of kincal does not read\n  = build it with `--features columnar`, or write it as CSV: \
+         `duckdb -c \"COPY 'a.parquet' TO 'a.csv'\"`, or in Python `pandas.read_parquet('a.parquet').to_csv('a.csv', index=False)`"
+    );
+    assert!(says("b", b"ARROW1\0\0").contains("`pandas.read_feather('b').to_csv('b.csv', index=False)`"));
+    let error = Recording::from_bytes("a", b"PAR1\x15\x04".as_slice(), &scara).expect_err("no reader");
+    assert!(error.mend().starts_with("build it with `--features columnar`"));
+    let error = kincal::recording::bytes_of("a.parquet", "# measurement: joint\n").expect_err("no writer");
+    assert_eq!(error.to_string(), "a.parquet: this build of kincal writes no Parquet file");
+}
+
+/// What says of itself what was measured needs no machine, no map and no guess; where a flag says something it is a table.
+#[test]
+fn a_recording_stays_as_it_is() {
+    let scara = machine("scara");
+    let text = "# machine: scara\n# measurement: position\n# tool_point: unknown ball\n\
+                q1[deg],q2[deg],q3[mm],q4[deg],px[mm],py[mm],pz[mm]\n0,0,0.10,0,1,2,3\n1,0,0,0,1,,3\n";
+    for machine in [None, Some(&scara)] {
+        let found = read("rec.csv", text.as_bytes(), machine, &Request::default()).expect("a recording");
+        assert_eq!((&*found.recordings[0].text, found.recordings[0].rows), (text, 2));
+        assert_eq!((found.recordings[0].with_gaps, &*found.map), (1, ""));
+    }
+    let wrong = text.replace("q4[deg]", "q4[mm]");
+    let error =
+        read("rec.csv", wrong.as_bytes(), Some(&scara), &Request::default()).expect_err("a wrong unit");
+    assert!(error.to_string().starts_with("rec.csv:4:4: "), "{error}");
+    let told = Request { units: pairs(&[("px", "mm")]), ..Request::default() };
+    assert!(!converted(text, &scara, &told).expect("a table").map.is_empty());
+}
+
 const LASER: &str = "HEADER::\r\nFile Type: 1\r\nOwner: Renishaw\r\n\r\nTARGET DATA::\r\nTarget-count: 3\r\nTargets :\r\n  0.0   10.0\r\n  20.0\r\nFlags: 0 0\r\n\
     USER-TEXT::\r\nMachine: mill 4\r\nAxis: X\r\nRUNS::\r\nRun-count: 2\r\nDEVIATIONS::\r\nRun Target Data:\r\n1 1 0.1\r\n1 2 -1.25\r\n1 3 2.0\r\n2 3 2.5\r\n2 2 -1.0\r\n2 1 0.3\r\nEOF::\r\n";
 
