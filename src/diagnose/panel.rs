@@ -10,9 +10,6 @@ use rayon::prelude::*;
 pub(super) const WIDTH: usize = 8;
 /// Rows that are looked at together: a panel's stay in a core's nearest cache while the other factor's columns pass by.
 const ROWS: usize = 512;
-/// Columns that one thread takes at a time, where a column has so many products to give that others can help.
-const APART: usize = 8;
-const MUCH: usize = 1 << 16;
 /// Blocks of samples of so many sizes, at most, that a panel can be put together in.
 pub(super) const LEVELS: usize = 3;
 
@@ -70,16 +67,16 @@ impl Panel {
 /// column of `C`.
 pub(super) fn add_along(panels: &[Arc<Panel>], first: usize, c: &DMatrixView<f64>, to: &mut DMatrix<f64>) {
     let wide = to.nrows();
-    if c.ncols() <= APART || c.nrows() * wide < MUCH {
-        return add_some_along(panels, first, c, to.as_mut_slice());
+    if wide == 0 {
+        return;
     }
-    to.as_mut_slice().par_chunks_mut(APART * wide).enumerate().for_each(|(chunk, to)| {
-        let own = c.columns(chunk * APART, to.len() / wide);
+    to.as_mut_slice().par_chunks_mut(WIDTH * wide).enumerate().for_each(|(chunk, to)| {
+        let own = c.columns(chunk * WIDTH, to.len() / wide);
         add_some_along(panels, first, &own, to);
     });
 }
 
-/// The same of so many columns that one thread does them; `to`: column by column.
+/// The same of the few columns that one thread takes at a time; `to`: column by column.
 fn add_some_along(panels: &[Arc<Panel>], first: usize, c: &DMatrixView<f64>, to: &mut [f64]) {
     let arch = Arch::new();
     let wide = panels.len() * WIDTH;
@@ -127,10 +124,7 @@ pub(super) fn take_away(panels: &[Arc<Panel>], along: &DMatrix<f64>, from: &mut 
             }
         }
     };
-    match rows * along.nrows() < MUCH {
-        true => from.as_mut_slice().chunks_mut(4 * rows).enumerate().for_each(take),
-        false => from.as_mut_slice().par_chunks_mut(4 * rows).enumerate().for_each(take),
-    }
+    from.as_mut_slice().par_chunks_mut(4 * rows).enumerate().for_each(take);
 }
 
 /// `Wᵀ C` of one panel and `K` columns.

@@ -22,8 +22,6 @@ pub(super) struct Whitener {
     pub out: Vec<bool>,
 }
 
-/// More columns than these are given to several threads.
-const FEW: usize = 8;
 const NONE: u32 = u32::MAX;
 /// Noise that remembers less than this is as good as white.
 const FORGETFUL: f64 = 0.2;
@@ -92,10 +90,7 @@ impl Whitener {
             }
         };
         let (own, to) = (columns.as_slice(), white.as_mut_slice());
-        match columns.ncols() > FEW {
-            true => own.par_chunks(4 * rows).zip(to.par_chunks_mut(4 * rows)).for_each(each),
-            false => own.chunks(4 * rows).zip(to.chunks_mut(4 * rows)).for_each(each),
-        }
+        own.par_chunks(4 * rows).zip(to.par_chunks_mut(4 * rows)).for_each(each);
         *columns = white;
     }
 
