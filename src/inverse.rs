@@ -21,8 +21,11 @@ use crate::few::Few;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use directions::{Direction, Equations, MOST, norm};
-pub(crate) use many::Foreseen;
 pub use options::{InverseOptions, Mode};
+
+inner! {
+    use many::{Foreseen, foresee};
+}
 
 /// Equations whose weakest direction is stronger than this part of the strongest are solved as they stand, to eleven digits; a Newton step
 /// needs fewer.

@@ -20,11 +20,14 @@ pub use fault::MachineFault;
 pub(crate) use form::{AngleUnit, LengthUnit, MachineForm, Triple, UnitsForm};
 pub(crate) use number::{Checked, OF_CALIBRATION, number, vec_to_si};
 pub(crate) use read::{at_path, is_usable_name};
-pub(crate) use shipped::SHIPPED;
 #[cfg(feature = "cli")]
 pub(crate) use shipped::shipped;
 pub use side::SideBranch;
 pub(crate) use write::{in_unit, to_text};
+
+inner! {
+    use shipped::SHIPPED;
+}
 
 use crate::error::{Error, Place, Result};
 use crate::lie::Vec3;

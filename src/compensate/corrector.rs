@@ -14,7 +14,7 @@ use crate::calibration::LeftOut;
 use crate::chain::Chain;
 use crate::decimal::{self, fixed};
 use crate::few::Few;
-use crate::inverse::{Foreseen, Goal, Inverse, Mode, Solution};
+use crate::inverse::{Foreseen, Goal, Inverse, Mode, Solution, foresee};
 use crate::lie::{Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use crate::nc::{Block, Dialect, How, Number, Word};
@@ -135,7 +135,7 @@ impl<'a, 'm> Corrector<'a, 'm> {
         let Some(first) = meant.first() else { return };
         let found = match self.model.chain_at(first) {
             Cow::Borrowed(chain) => {
-                self.solvers.inverse.foresee((control.nominal(), chain), control.tip(), meant)
+                foresee(&self.solvers.inverse, (control.nominal(), chain), control.tip(), meant)
             }
             // Errors that bend from place to place are looked at there.
             Cow::Owned(_) => return,

@@ -201,15 +201,3 @@ fn join(parent: &str, path: &str) -> String {
         format!("{parent}.{path}")
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_comes_with_the_crate_is_read() {
-        for library in [Library::standard(), Library::unnamed(), Library::primitives()] {
-            assert!(!library.families().is_empty());
-        }
-    }
-}

@@ -80,9 +80,9 @@ impl Information {
         let scales = layout.scales();
         let scaled = DMatrix::from_fn(layout.len, layout.len, |a, b| matrix[(a, b)] * scales[a] * scales[b]);
         let has_prior = layout.mask(|b| b.prior);
-        let eigen = SymmetricEigen::new(scaled.clone());
-        let largest = eigen.eigenvalues.amax();
-        let rank = eigen.eigenvalues.iter().filter(|v| **v > SEEN * largest).count();
+        let eigenvalues = scaled.symmetric_eigenvalues();
+        let largest = eigenvalues.amax();
+        let rank = eigenvalues.iter().filter(|v| **v > SEEN * largest).count();
 
         let positions: Vec<usize> = (0..layout.len).filter(|i| has_prior[*i]).collect();
         let rest: Vec<usize> = (0..layout.len).filter(|i| !has_prior[*i]).collect();

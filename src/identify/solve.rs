@@ -336,7 +336,7 @@ fn one_step(solver: Solver, mut matrix: DMatrix<f64>, gradient: &DVector<f64>) -
             }
         }
         Solver::GaussNewton => {
-            let smallest = SymmetricEigen::new(matrix.clone()).eigenvalues.min();
+            let smallest = matrix.symmetric_eigenvalues().min();
             if smallest <= UNSEEN * largest {
                 return Err(singular(smallest / largest));
             }

@@ -19,42 +19,36 @@ const NEAR: f64 = 1e-2;
 
 /// A goal that was looked at beforehand, and what came of it.
 #[derive(Clone, Debug)]
-pub(crate) struct Foreseen {
+pub struct Foreseen {
     /// The commands, m or rad, that have the tip of the nominal machine at the goal.
     pub meant: Few<f64>,
+    /// Where the tip should be.
     pub goal: Goal,
+    /// What [`Inverse::solve`] would have found.
     pub solution: Solution,
 }
 
-impl Inverse<'_> {
-    /// [`Inverse::solve`] for every goal that the nominal machine reaches with its commands at `meant`, begun there with all commands free;
-    /// `None` where it takes a closer look.
-    pub(crate) fn foresee(
-        &self,
-        (nominal, actual): (&Chain<f64>, &Chain<f64>),
-        t_from_tip: Pose<f64>,
-        meant: &[Few<f64>],
-    ) -> Vec<Option<Foreseen>> {
-        let commands = self.machine.commands().len();
-        let slides: Few<usize> = (0..commands).filter(|c| self.is_slide(*c)).collect();
-        let (Mode::PositionAndAxis, true, [x, y, z]) = (self.mode, self.by_slides, &slides[..]) else {
-            return vec![None; meant.len()];
-        };
-        let mut found = vec![None; meant.len()];
-        let slides = [*x, *y, *z];
-        let (nominal, actual) = (nominal.path(), actual.path());
-        Arch::new().dispatch(Many {
-            inverse: self,
-            nominal,
-            actual,
-            t_from_tip,
-            slides,
-            meant,
-            found: &mut found,
-        });
-        found
-    }
+/// [`Inverse::solve`] for every goal that the nominal machine reaches with its commands at `meant`, begun there with all commands free;
+/// `None` where it takes a closer look.
+pub fn foresee(
+    inverse: &Inverse,
+    (nominal, actual): (&Chain<f64>, &Chain<f64>),
+    t_from_tip: Pose<f64>,
+    meant: &[Few<f64>],
+) -> Vec<Option<Foreseen>> {
+    let commands = inverse.machine.commands().len();
+    let slides: Few<usize> = (0..commands).filter(|c| inverse.is_slide(*c)).collect();
+    let (Mode::PositionAndAxis, true, [x, y, z]) = (inverse.mode, inverse.by_slides, &slides[..]) else {
+        return vec![None; meant.len()];
+    };
+    let mut found = vec![None; meant.len()];
+    let slides = [*x, *y, *z];
+    let (nominal, actual) = (nominal.path(), actual.path());
+    Arch::new().dispatch(Many { inverse, nominal, actual, t_from_tip, slides, meant, found: &mut found });
+    found
+}
 
+impl Inverse<'_> {
     fn is_slide(&self, command: usize) -> bool {
         self.machine.command_joint(command).kind == JointKind::Prismatic
     }
@@ -229,59 +223,6 @@ impl WithSimd for Many<'_> {
                     },
                 });
             }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use rand::SeedableRng;
-    use rand::rngs::StdRng;
-
-    use super::*;
-    use crate::check::random_command;
-    use crate::machine::Machine;
-
-    #[test]
-    fn many_goals_are_solved_as_one_at_a_time() {
-        let machines = [
-            include_str!("../../machines/ac_table_tilting.ron"),
-            include_str!("../../machines/bc_head_head_nutating.ron"),
-            include_str!("../../machines/bc_head_table.ron"),
-        ];
-        for text in machines {
-            let machine = Machine::parse("machine.ron", text).expect("a machine that comes with the crate");
-            let mut rng = StdRng::seed_from_u64(8);
-            let off = |j: usize| {
-                let sizes = machine.tolerance(j).to_array().into_iter().enumerate();
-                let values: Vec<f64> = sizes.map(|(k, t)| t * (1.0 + (3 * j + k) as f64).sin()).collect();
-                Twist::from_array(std::array::from_fn(|k| values[k]))
-            };
-            let dh: Vec<Twist<f64>> = (0..machine.dyads().len()).map(off).collect();
-            let (nominal, actual) = (Chain::nominal(&machine), Chain::new(&machine, &dh));
-            let (inverse, count) = (Inverse::new(&machine), machine.commands().len());
-            let t_from_tip = Pose::translation(Vec3([0.0, 0.0, -0.08]));
-            let meant: Vec<Few<f64>> = (0..61)
-                .map(|_| (0..count).map(|c| random_command(&machine, c, &mut rng)).collect())
-                .collect();
-            let found = inverse.foresee((&nominal, &actual), t_from_tip, &meant);
-            let apart = inverse.foresee((&nominal, &actual), t_from_tip, &meant[7..8]);
-            let mut solved = 0;
-            for (k, (meant, found)) in meant.iter().zip(&found).enumerate() {
-                let Some(found) = found else { continue };
-                let goal = Goal { t_from_tip, w_from_tip: nominal.tool_pose(meant) * t_from_tip };
-                let single = inverse.solve(&actual, &goal, meant, &vec![true; count]);
-                assert_eq!(single.outcome, Outcome::Reached);
-                for (a, b) in single.commands.iter().zip(&found.solution.commands) {
-                    assert!((a - b).abs() < 1e-12, "{}: {k}: {a} {b}", machine.name());
-                }
-                // Neighbours do not matter.
-                if let (7, Some(apart)) = (k, &apart[0]) {
-                    assert_eq!(apart.solution.commands, found.solution.commands);
-                }
-                solved += 1;
-            }
-            assert!(solved > 40, "{}: {solved}", machine.name());
         }
     }
 }

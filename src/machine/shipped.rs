@@ -8,7 +8,7 @@ macro_rules! texts {
 }
 
 /// Their names and files, by name.
-pub(crate) const SHIPPED: [(&str, &str); 23] = texts! {
+pub const SHIPPED: [(&str, &str); 23] = texts! {
     "ac_head_head"
     "ac_table_tilting"
     "ac_table_tilting_paper"
@@ -38,21 +38,4 @@ pub(crate) const SHIPPED: [(&str, &str); 23] = texts! {
 #[cfg(feature = "cli")]
 pub(crate) fn shipped(name: &str) -> Option<&'static str> {
     SHIPPED.iter().find(|(own, _)| *own == name).map(|(_, text)| *text)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::SHIPPED;
-    use crate::machine::Machine;
-
-    #[test]
-    fn every_machine_of_the_folder_comes_with_the_crate_and_is_named_like_its_file() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/machines");
-        let files = std::fs::read_dir(folder).expect("the folder").filter_map(Result::ok);
-        let files = files.filter(|file| file.path().extension().is_some_and(|end| end == "ron")).count();
-        assert_eq!(SHIPPED.len(), files);
-        for (name, text) in SHIPPED {
-            assert_eq!(Machine::parse(name, text).expect("a machine").name(), name);
-        }
-    }
 }

@@ -2,7 +2,7 @@
 
 use crate::common;
 use kincal::chain::Chain;
-use kincal::inverse::{Goal, Inverse, InverseOptions, Mode, Outcome, Solution};
+use kincal::inverse::{Goal, Inverse, InverseOptions, Mode, Outcome, Solution, foresee};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::machine::JointKind;
 use kincal::simulate::{random_commands, random_deviations};
@@ -214,4 +214,40 @@ fn poses_out_of_reach_are_told_and_a_far_start_finds_the_way() {
     let there = Goal { t_from_tip: Pose::identity(0.0), w_from_tip: nominal.w_from_t(&q) };
     let solution = Inverse::new(&machine).solve(&nominal, &there, &[0.0; 5], &all_free(&machine));
     assert_eq!(solution.outcome, Outcome::Reached, "{solution:?}");
+}
+
+#[test]
+fn many_goals_are_solved_as_one_at_a_time() {
+    for stem in ["ac_table_tilting", "bc_head_head_nutating", "bc_head_table"] {
+        let machine = machine(stem);
+        let off = |j: usize| {
+            let sizes = machine.tolerance(j).to_array().into_iter().enumerate();
+            let values: Vec<f64> = sizes.map(|(k, t)| t * (1.0 + (3 * j + k) as f64).sin()).collect();
+            Twist::from_array(std::array::from_fn(|k| values[k]))
+        };
+        let dh: Vec<Twist<f64>> = (0..machine.dyads().len()).map(off).collect();
+        let (nominal, actual) = (Chain::nominal(&machine), Chain::new(&machine, &dh));
+        let (inverse, count) = (Inverse::new(&machine), machine.commands().len());
+        let t_from_tip = Pose::translation(Vec3([0.0, 0.0, -0.08]));
+        let meant: Vec<_> =
+            random_commands(&machine, 61, 8).into_iter().map(|q| q.into_iter().collect()).collect();
+        let found = foresee(&inverse, (&nominal, &actual), t_from_tip, &meant);
+        let apart = foresee(&inverse, (&nominal, &actual), t_from_tip, &meant[7..8]);
+        let mut solved = 0;
+        for (k, (meant, found)) in meant.iter().zip(&found).enumerate() {
+            let Some(found) = found else { continue };
+            let goal = Goal { t_from_tip, w_from_tip: nominal.w_from_t(meant) * t_from_tip };
+            let single = inverse.solve(&actual, &goal, meant, &vec![true; count]);
+            assert_eq!(single.outcome, Outcome::Reached);
+            for (a, b) in single.commands.iter().zip(&found.solution.commands) {
+                assert!((a - b).abs() < 1e-12, "{}: {k}: {a} {b}", machine.name());
+            }
+            // Neighbours do not matter.
+            if let (7, Some(apart)) = (k, &apart[0]) {
+                assert_eq!(apart.solution.commands, found.solution.commands);
+            }
+            solved += 1;
+        }
+        assert!(solved > 40, "{}: {solved}", machine.name());
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use kincal::lie::Vec3;
-use kincal::machine::{Dyad, FileUnits, Joint, JointKind, MassPoint, NcWord, Placement, Tolerance};
+use kincal::machine::{Dyad, FileUnits, Joint, JointKind, MassPoint, NcWord, Placement, SHIPPED, Tolerance};
 use kincal::units::{Quantity, Unit};
 use kincal::{Chain, Machine};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, UnitVector3, Vector3};
@@ -26,6 +26,16 @@ fn shipped() -> Vec<(PathBuf, Machine)> {
         (path, machine)
     };
     paths.into_iter().map(open).collect()
+}
+
+#[test]
+fn every_machine_of_the_folder_comes_with_the_crate_and_is_named_like_its_file() {
+    let folder = shipped();
+    assert_eq!(SHIPPED.len(), folder.len());
+    for (name, text) in SHIPPED {
+        assert_eq!(Machine::parse(name, text).expect("a machine").name(), name);
+        assert!(folder.iter().any(|(path, _)| path.file_stem().is_some_and(|stem| stem == name)), "{name}");
+    }
 }
 
 /// Commands inside the limits, m or rad; `k` chooses one of many fixed poses.
