@@ -7,6 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
 use super::finding::HeldOutPair;
 use super::marginal::{gram, with_prior};
+use super::noise::Noise;
 use super::search::{ModelTerm, Search, all_but};
 use crate::feature::Samples;
 use crate::units::{ByQuantity, Quantity};
@@ -112,14 +113,31 @@ pub(super) fn are_better(search: &Search, these: &[ModelTerm], others: &[ModelTe
     fall > error
 }
 
-/// Which part of the squares of left-out stretches is left with all effects, against what the first of them leave; each quantity in units of
-/// its mean with these. `None` where there are too few rows.
-pub(super) fn remaining(search: &Search, in_model: &[ModelTerm], first: usize) -> Option<f64> {
+/// Which part of the squares of left-out stretches is left with all effects, against what the first of them leave, the noise's own taken from
+/// both; each quantity in units of its mean with these. `None` where there are too few rows, or nothing but noise.
+pub(super) fn remaining(
+    search: &Search,
+    noise: &[Noise],
+    in_model: &[ModelTerm],
+    first: usize,
+) -> Option<f64> {
     let folds = Folds::new(search, in_model)?;
     let before = folds.left_out(search, &|effect| effect < first);
     let (fall, _) = folds.fall(search, &before, &folds.left_out(search, &|_| true));
-    let used = search.rows.whitener.out.iter().filter(|out| !**out).count();
-    Some(1.0 - fall / used.max(1) as f64)
+    let used = |row: &usize| !search.rows.whitener.out[*row];
+    let all = (0..before.len()).filter(used).count() as f64;
+    let mut of_noise = 0.0;
+    // Of settled positions nothing tells the noise but what is left. What remembers for long may be a misfit.
+    if search.in_motion {
+        let means = folds.means(search, &before, &|_| true);
+        let mean = |row: usize| if search.rows.linear.angle[row] { means.rad } else { means.m };
+        for (run, noise) in search.runs.iter().zip(noise) {
+            let variance = noise.shortened().sigma.powi(2);
+            let rows = run.iter().filter(|row| used(row));
+            of_noise += rows.map(|row| variance / mean(*row)).sum::<f64>();
+        }
+    }
+    (all > of_noise).then(|| 1.0 - fall / (all - of_noise))
 }
 
 /// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
@@ -420,12 +438,7 @@ impl Folds {
     ) -> (f64, f64) {
         let linear = search.rows.linear;
         let used = |row: &usize| !search.rows.whitener.out[*row] && counts(*row);
-        let means = ByQuantity::of(|quantity| {
-            let of = |row: &usize| linear.angle[*row] == (quantity == Quantity::Angle);
-            let rows: Vec<usize> = (0..without.len()).filter(used).filter(of).collect();
-            let squares: f64 = rows.iter().map(|row| without[*row].powi(2)).sum();
-            (squares / rows.len().max(1) as f64).max(f64::MIN_POSITIVE)
-        });
+        let means = self.means(search, without, counts);
         let mean = |row: usize| if linear.angle[row] { means.rad } else { means.m };
         let mut cells: BTreeMap<(usize, usize), f64> = BTreeMap::new();
         for (number, span) in linear.spans.iter().enumerate() {
@@ -437,6 +450,17 @@ impl Folds {
         let (count, sum) = (cells.len() as f64, cells.values().sum::<f64>());
         let spread = cells.values().map(|x| (x - sum / count).powi(2)).sum::<f64>() / (count - 1.0);
         (sum, (count * spread).sqrt())
+    }
+
+    /// Mean squares of what is left in the rows that count.
+    fn means(&self, search: &Search, left: &[f64], counts: &dyn Fn(usize) -> bool) -> ByQuantity<f64> {
+        ByQuantity::of(|quantity| {
+            let of = |row: &usize| search.rows.linear.angle[*row] == (quantity == Quantity::Angle);
+            let used = |row: &usize| !search.rows.whitener.out[*row] && counts(*row);
+            let rows: Vec<usize> = (0..left.len()).filter(used).filter(of).collect();
+            let squares: f64 = rows.iter().map(|row| left[*row].powi(2)).sum();
+            (squares / rows.len().max(1) as f64).max(f64::MIN_POSITIVE)
+        })
     }
 
     /// By which factor it grows with all effects beside geometry.

@@ -156,7 +156,7 @@ fn law(
                 && laws.moves_alike(taken, other)
                 && !(has_grid(taken) && has_grid(other))
         });
-        all.push(term);
+        all.push(ModelTerm { state: search.state_of(&term), ..term });
         // What came later may say what was said before.
         if let Some(i) = (others.len()..all.len()).find(|i| !is_foretold(search, &all, *i)) {
             all.remove(i);

@@ -39,7 +39,7 @@ const TOLERATED: f64 = 0.2;
 /// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
 /// leaves fewer independent readings.
 const SURPRISE: f64 = 0.003;
-/// What is modelled without a name leaves no more than this part of the squares of left-out stretches. Where it foretells less, the law is
+/// What is modelled without a name leaves no more than this part of the squares of left-out stretches beyond the noise's. Where it foretells less, the law is
 /// another one, and where that does nothing, what was taken for it would do harm.
 const HALF: f64 = 0.5;
 /// Several names that make the mean square of stretches left out so many times that of geometry alone are a patchwork.
@@ -85,7 +85,7 @@ pub(super) fn report(
         doubt => doubt,
     };
     // Where names do not explain all that is there, they stand if they foretell more than what has no name does.
-    let proved = doubt.as_ref().and_then(|_| proved(search, in_model, machine, facts));
+    let proved = doubt.as_ref().and_then(|_| proved(search, in_model, (machine, facts), noise));
     let is_proved = proved.is_some();
     let in_model = proved.as_deref().unwrap_or(in_model);
     if is_proved {
@@ -133,7 +133,7 @@ pub(super) fn report(
     all.sort_by(|(a, _), (b, _)| b.1.delta_bic.total_cmp(&a.1.delta_bic));
     let (told, placebos): (Vec<_>, Vec<_>) = all.into_iter().unzip();
     let kept: Vec<ModelTerm> = told.iter().map(|(i, ..)| in_model[*i].clone()).collect();
-    let companions = shared::companions(search, library, &kept);
+    let mut companions = shared::companions(search, library, &kept);
     let mut told: Vec<Told> = (told.into_iter().zip(placebos).zip(kept))
         .map(|(((_, finding, named), placebo), term)| Told { term, finding, named, placebo })
         .collect();
@@ -144,18 +144,28 @@ pub(super) fn report(
     let unnamed = doubt.as_ref().map(|_| Unnamed::beside(search, machine, facts));
     let wide = unnamed.as_ref().map(|unnamed| unnamed.rows(search));
     let wide = unnamed.as_ref().zip(wide.as_ref()).map(|(unnamed, rows)| unnamed.search(search, rows));
-    let search = wide.as_ref().unwrap_or(search);
+    let (narrow, search) = (search, wide.as_ref().unwrap_or(search));
     let (mut parts, mut of_parts, mut unexplained) = (Vec::new(), Vec::new(), None);
     let mut of_companions = None;
     let mut proposals = Vec::new();
     if let Some((unnamed, doubt)) = unnamed.as_ref().zip(doubt) {
+        let (modelled, only_told) = loop {
+            let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
+            let (modelled, only_told) = unnamed.parts(search, &known);
+            // Beside them too a name has to foretell something.
+            let all = [known.as_slice(), &modelled].concat();
+            let idle = (!modelled.is_empty()).then(|| least_foretold(search, &all, told.len())).flatten();
+            let Some(i) = idle else { break (modelled, only_told) };
+            told.remove(i);
+            let kept: Vec<ModelTerm> = told.iter().map(|t| t.term.clone()).collect();
+            companions = shared::companions(narrow, library, &kept);
+        };
         let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
-        let (modelled, only_told) = unnamed.parts(search, &known);
         let naming = unnamed.named(search, &known, modelled.clone());
         let found = naming.told.iter().map(|given| &given.term).chain(&naming.parts);
         let all: Vec<ModelTerm> = known.iter().chain(found).cloned().collect();
         let is_modelled = !modelled.is_empty()
-            && folds::remaining(search, &all, known.len()).is_some_and(|part| part <= HALF);
+            && folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF);
         let (naming, only_told) = match is_modelled {
             true => (naming, Vec::new()),
             false if is_rest => (naming.withdrawn(), Vec::new()),
@@ -241,7 +251,7 @@ pub(super) fn report(
                 of_set_up: library.families()[c.family].each_setup,
             })
             .collect(),
-        stand_still: approaches(search, &kept, machine),
+        stand_still: approaches(search, &in_model, machine),
         named,
         not_tried: Vec::new(),
         unseen_side_branches: Vec::new(),
@@ -299,8 +309,8 @@ fn promoted(
 fn proved(
     search: &Search,
     in_model: &[ModelTerm],
-    machine: &Machine,
-    facts: &RecordingFacts,
+    (machine, facts): (&Machine, &RecordingFacts),
+    noise: &[Noise],
 ) -> Option<Vec<ModelTerm>> {
     // No other recording has this one's clock.
     let lasting = in_model.iter().filter(|effect| !search.goes_by_clock(effect.candidate));
@@ -309,12 +319,12 @@ fn proved(
         is_outdone(&placebo(search, names, i, machine)) || says_no_more(search, names, i)
     };
     let worst = |names: &[ModelTerm]| {
-        least_foretold(search, names).or_else(|| (0..names.len()).find(|i| is_empty(names, *i)))
+        least_foretold(search, names, names.len()).or_else(|| (0..names.len()).find(|i| is_empty(names, *i)))
     };
     while let Some(i) = worst(&names) {
         names.remove(i);
     }
-    if folds::remaining(search, &names, 0).is_none_or(|part| part > HALF) {
+    if folds::remaining(search, noise, &names, 0).is_none_or(|part| part > HALF) {
         return None;
     }
     let unnamed = Unnamed::beside(search, machine, facts);
