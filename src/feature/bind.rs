@@ -202,7 +202,10 @@ impl Feature {
     pub fn needs_history(&self) -> bool {
         let history = |n: &Node| {
             matches!(n, Node::Joint(_, Column::Direction | Column::SinceReversal | Column::Travelled))
-                || matches!(n, Node::Play { .. } | Node::TakeUp { .. } | Node::Lag { .. })
+                || matches!(
+                    n,
+                    Node::Play { .. } | Node::PlayOf { .. } | Node::TakeUp { .. } | Node::Lag { .. }
+                )
         };
         any(&self.node, &history)
     }
@@ -341,6 +344,11 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
             let (joint, memory) = (own()?, next());
             Node::Play { joint, width: Box::new(bind(width, b, memories)?), memory }
         }
+        E::PlayOf(of, width) => {
+            let memory = next();
+            let (of, width) = (Box::new(bind(of, b, memories)?), Box::new(bind(width, b, memories)?));
+            Node::PlayOf { of, width, memory }
+        }
         E::TakeUp(length) => {
             let (joint, memory) = (own()?, next());
             Node::TakeUp { joint, length: Box::new(bind(length, b, memories)?), memory }
@@ -353,7 +361,7 @@ fn bind(expression: &Expression, b: &Binding, memories: &mut usize) -> Result<No
     })
 }
 
-fn parts(node: &Node) -> Vec<&Node> {
+pub(super) fn parts(node: &Node) -> Vec<&Node> {
     match node {
         Node::Number(_)
         | Node::Parameter(_)
@@ -373,7 +381,7 @@ fn parts(node: &Node) -> Vec<&Node> {
             vec![e]
         }
         Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],
-        Node::Lag { of, time, .. } => vec![of, time],
+        Node::PlayOf { of, width: with, .. } | Node::Lag { of, time: with, .. } => vec![of, with],
     }
 }
 
@@ -397,7 +405,7 @@ fn parts_mut(node: &mut Node) -> Vec<&mut Node> {
             vec![e]
         }
         Node::Play { width: e, .. } | Node::TakeUp { length: e, .. } => vec![e],
-        Node::Lag { of, time, .. } => vec![of, time],
+        Node::PlayOf { of, width: with, .. } | Node::Lag { of, time: with, .. } => vec![of, with],
     }
 }
 
@@ -425,7 +433,11 @@ fn delay(node: &mut Node, joint: usize, by: f64) {
 }
 
 fn renumber(node: &mut Node, by: usize) {
-    if let Node::Play { memory, .. } | Node::TakeUp { memory, .. } | Node::Lag { memory, .. } = node {
+    if let Node::Play { memory, .. }
+    | Node::PlayOf { memory, .. }
+    | Node::TakeUp { memory, .. }
+    | Node::Lag { memory, .. } = node
+    {
         *memory += by;
     }
     parts_mut(node).into_iter().for_each(|part| renumber(part, by));

@@ -185,6 +185,10 @@ pub fn dimension_of(expression: &Expression, scope: &Scope) -> Result<Dimension,
             let d = Dimension::of_joint(own()?);
             expect(width, "[0]", d, "the width of play").map(|()| d)
         }
+        PlayOf(e, width) => {
+            let d = part(e, "[0]")?;
+            expect(width, "[1]", d, "the width of play").map(|()| d)
+        }
         TakeUp(length) => expect(length, "[0]", Dimension::of_joint(own()?), "the length of take-up")
             .map(|()| Dimension::ONE),
         Lag(e, time) => {

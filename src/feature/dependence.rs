@@ -1,6 +1,6 @@
 //! What a feature depends on, in words.
 
-use super::bind::{Feature, each};
+use super::bind::{Feature, each, parts};
 use super::node::{Column, Node};
 
 /// Something that a feature depends on.
@@ -16,19 +16,7 @@ impl Feature {
     /// What it depends on, in the order in which it is written; each once.
     pub(crate) fn depends_on(&self) -> Vec<Dependence> {
         let mut all: Vec<Dependence> = Vec::new();
-        each(&self.node, &mut |node| {
-            let on = match node {
-                Node::Joint(j, column) => Dependence::Joint(of_column(*column), *j),
-                Node::Late(j, _) => Dependence::Joint("position", *j),
-                // Where it stands between its stops, or how far it has been taken up, follows from which way the joint came.
-                Node::Play { joint, .. } | Node::TakeUp { joint, .. } => {
-                    Dependence::Joint("direction", *joint)
-                }
-                Node::Time(_) | Node::Lag { .. } => Dependence::Other("time".into()),
-                Node::Order(..) => Dependence::Other("order of samples".into()),
-                Node::Channel(name, _) => Dependence::Other(name.clone()),
-                _ => return,
-            };
+        gather(&self.node, false, &mut |on| {
             if !all.contains(&on) {
                 all.push(on);
             }
@@ -46,12 +34,35 @@ impl Feature {
                 is_more = true
             }
             Node::Needing(..) | Node::Only(..) => is_more = true,
-            Node::Play { .. } | Node::TakeUp { .. } | Node::Lag { .. } => is_more = true,
+            Node::Play { .. } | Node::PlayOf { .. } | Node::TakeUp { .. } | Node::Lag { .. } => {
+                is_more = true
+            }
             Node::Number(_) | Node::Parameter(_) | Node::Sum(_) | Node::Product(_) | Node::Quotient(_) => {}
             Node::Power(..) | Node::Function(..) | Node::Chebyshev(..) | Node::Between(..) => {}
         });
         (!is_more).then_some(joints)
     }
+}
+
+/// Everything that a node depends on. Where something stands between its stops, or how far it has been taken up, follows from which way the
+/// joints came: of what is `driven`, positions say no more than that.
+fn gather(node: &Node, driven: bool, take: &mut dyn FnMut(Dependence)) {
+    match node {
+        Node::Joint(j, Column::Position) | Node::Late(j, _) if driven => {
+            take(Dependence::Joint("direction", *j));
+        }
+        Node::Joint(j, column) => take(Dependence::Joint(of_column(*column), *j)),
+        Node::Late(j, _) => take(Dependence::Joint("position", *j)),
+        Node::Play { joint, .. } | Node::TakeUp { joint, .. } => {
+            take(Dependence::Joint("direction", *joint));
+        }
+        Node::Time(_) | Node::Lag { .. } => take(Dependence::Other("time".into())),
+        Node::Order(..) => take(Dependence::Other("order of samples".into())),
+        Node::Channel(name, _) => take(Dependence::Other(name.clone())),
+        _ => {}
+    }
+    let driven = driven || matches!(node, Node::PlayOf { .. });
+    parts(node).into_iter().for_each(|part| gather(part, driven, take));
 }
 
 fn of_column(column: Column) -> &'static str {

@@ -266,12 +266,13 @@ impl<S: Scalar> Pass<'_, S> {
                     // docs/effects.md (45): the driven member stays where it is, within half the width of the drive.
                     let half = clip(width.at(k)).scale(0.5);
                     let q = half.lift(q);
-                    let driven = past.map_or(q - half.scale(direction), |past| past.value);
-                    let (low, high) = (q - half, q + half);
-                    let driven = (driven - low).select_below(0.0, low, driven);
-                    let driven = (high - driven).select_below(0.0, high, driven);
+                    let driven = carried(past.map_or(q - half.scale(direction), |past| past.value), q, half);
                     (driven, driven - q)
                 })
+            }
+            Node::PlayOf { of, width, memory } => {
+                let (of, width) = (self.evaluate(of), self.evaluate(width));
+                self.play_of(&of, &width, *memory)
             }
             Node::TakeUp { joint, length, memory } => {
                 let length = self.evaluate(length);
@@ -327,6 +328,21 @@ impl<S: Scalar> Pass<'_, S> {
         Value::Column(column)
     }
 
+    /// docs/effects.md (45), of what an expression drives; before the first sample nobody knows where it was, and it is taken for the middle.
+    fn play_of(&mut self, of: &Value<S>, width: &Value<S>, memory: usize) -> Value<S> {
+        let mut past = if self.samples.first { None } else { self.memory.0[memory] };
+        let column = (0..self.samples.len)
+            .map(|k| {
+                let (q, half) = (of.at(k), clip(width.at(k)).scale(0.5));
+                let value = carried(past.map_or(q, |past| past.value), q, half);
+                past = Some(Past { value, at: 0.0 });
+                value - q
+            })
+            .collect();
+        self.memory.0[memory] = past;
+        Value::Column(column)
+    }
+
     /// docs/effects.md (47): a first-order low-pass over time, its input holding each sample's value since the one before; it goes on from one
     /// recording to the next, since what is warm stays warm.
     fn lag(&mut self, of: &Value<S>, constant: &Value<S>, memory: usize) -> Value<S> {
@@ -365,6 +381,13 @@ impl JointSamples {
             Column::Weight(index) => self.weights.get(index).map_or(&[], Vec::as_slice),
         }
     }
+}
+
+/// What stands where it is, within half a width of its drive at `q`.
+fn carried<S: Scalar>(driven: S, q: S, half: S) -> S {
+    let (low, high) = (q - half, q + half);
+    let driven = (driven - low).select_below(0.0, low, driven);
+    (high - driven).select_below(0.0, high, driven)
 }
 
 /// No less than zero.

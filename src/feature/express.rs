@@ -66,6 +66,7 @@ fn express(node: &Node, machine: &Machine, parameters: &[String]) -> Expression 
         Node::Chebyshev(order, e) => E::Chebyshev(*order, inner(e)),
         Node::Between(e, from, to) => E::Between(inner(e), *from, *to),
         Node::Play { joint, width, .. } => of(*joint, E::Play(inner(width))),
+        Node::PlayOf { of, width, .. } => E::PlayOf(inner(of), inner(width)),
         Node::TakeUp { joint, length, .. } => of(*joint, E::TakeUp(inner(length))),
         Node::Lag { of, time, .. } => E::Lag(inner(of), inner(time)),
     }

@@ -95,6 +95,9 @@ pub enum Expression {
 
     /// Deviation of what hangs behind the own joint with play of this width (total).
     Play(Box<Expression>),
+    /// The same of what is driven by the first expression, such as a cable that runs over two joints, with the second as width; it begins in
+    /// the middle of its play.
+    PlayOf(Box<Expression>, Box<Expression>),
     /// Runs from its present value to the direction of travel, -1 or 1, as `1 - exp(-d/length)` of the path `d`.
     TakeUp(Box<Expression>),
     /// First, low-passed with the second as time constant.
@@ -121,7 +124,7 @@ impl Expression {
             Sum(list) | Product(list) => {
                 list.iter().enumerate().map(|(i, e)| (e, format!("[0][{i}]"))).collect()
             }
-            Difference(a, b) | Quotient(a, b) | Lag(a, b) => {
+            Difference(a, b) | Quotient(a, b) | PlayOf(a, b) | Lag(a, b) => {
                 vec![(&**a, "[0]".into()), (&**b, "[1]".into())]
             }
             Of(_, e) | Chebyshev(_, e) | Only(_, e) => vec![(&**e, "[1]".into())],

@@ -42,6 +42,13 @@ fn write(e: &Expression, f: &mut fmt::Formatter<'_>, at_least: u8, mark: &str) -
         write(e, f, 0, mark)?;
         f.write_str(")")
     };
+    let pair = |f: &mut fmt::Formatter<'_>, name: &str, (e, by): (&Expression, &Expression)| {
+        write!(f, "{name}(")?;
+        write(e, f, 0, mark)?;
+        f.write_str("; ")?;
+        write(by, f, 0, mark)?;
+        f.write_str(")")
+    };
     let list = |f: &mut fmt::Formatter<'_>, parts: &[Expression], between: &str, tight: u8| {
         for (i, part) in parts.iter().enumerate() {
             let sign = *part == Number(-1.0) && i == 0 && parts.len() > 1;
@@ -127,13 +134,8 @@ fn write(e: &Expression, f: &mut fmt::Formatter<'_>, at_least: u8, mark: &str) -
         Between(e, ..) => call(f, "between", e),
         Play(e) => call(f, &format!("play{mark}"), e),
         TakeUp(e) => call(f, &format!("takeup{mark}"), e),
-        Lag(e, time) => {
-            f.write_str("lag(")?;
-            write(e, f, 0, mark)?;
-            f.write_str("; ")?;
-            write(time, f, 0, mark)?;
-            f.write_str(")")
-        }
+        PlayOf(e, width) => pair(f, "play", (e, width)),
+        Lag(e, time) => pair(f, "lag", (e, time)),
     }
 }
 

@@ -29,6 +29,11 @@ pub(super) enum Node {
         width: Box<Node>,
         memory: usize,
     },
+    PlayOf {
+        of: Box<Node>,
+        width: Box<Node>,
+        memory: usize,
+    },
     TakeUp {
         joint: usize,
         length: Box<Node>,
