@@ -10,7 +10,7 @@ fn arm() -> PathBuf {
 }
 
 fn to(tip: &str) -> Ends {
-    Ends { base: Some("world".into()), tip: Some(tip.into()) }
+    Ends::default().with_base("world").with_tip(tip)
 }
 
 /// Where MuJoCo's `mj_kinematics` has a body or a site of `tests/mjcf/arm.xml`, m; joints in rad and m.
@@ -153,7 +153,7 @@ fn a_model_without_names_of_ends_has_those_that_there_is_but_one_of() {
 
 #[test]
 fn a_chain_may_begin_behind_a_joint_that_is_free() {
-    let ends = Ends { base: Some("cart".into()), tip: Some("flag".into()) };
+    let ends = Ends::default().with_base("cart").with_tip("flag");
     let mast = open(arm(), &ends).expect("sound").machine;
     assert_eq!(mast.commands(), ["mast"]);
     let pose = Chain::nominal(&mast).w_from_t(&[std::f64::consts::FRAC_PI_2]);
@@ -174,8 +174,7 @@ fn the_file_of_an_imported_model() {
 
 fn beside(parts: &[(&str, &str)]) -> ImportOptions {
     let mut options = ImportOptions::default();
-    options.beside =
-        (parts.iter().map(|(file, text)| Beside { file: file.into(), text: (*text).into() })).collect();
+    options.beside = (parts.iter().map(|(file, text)| Beside::new(file, *text))).collect();
     options
 }
 
