@@ -181,6 +181,7 @@ impl CalibratedMachine {
     ///
     /// # Panics
     /// If there is not one deviation per dyad.
+    #[must_use]
     pub fn with_deviations(mut self, deviations: Vec<Twist<f64>>) -> Self {
         assert_eq!(deviations.len(), self.machine.dyads().len(), "one deviation per dyad");
         self.deviations = deviations;

@@ -94,6 +94,7 @@ pub struct CircularTest {
 }
 
 /// A sample of a circular test.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turned {
     /// About the axis, rad, going on over full turns.

@@ -123,8 +123,8 @@ pub(crate) use mark::Fingerprint;
 pub use model::Model;
 pub use options::{CompensateOptions, IntegerUnit, UnknownAxes};
 pub use report::{
-    Beyond, Listed, MOST_LISTED, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached,
-    Unseen, UnseenPattern, UnseenPiece, Worst,
+    ExtrapolatedJoint, Listed, MOST_LISTED, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay,
+    Unreached, Unseen, UnseenPattern, UnseenPiece, Worst,
 };
 pub use setup::{Setup, ToolAxis};
 #[cfg(feature = "cli")]

@@ -26,6 +26,7 @@ mod positioning;
 mod r_test;
 mod recorded;
 mod renishaw;
+mod request;
 mod rotation;
 mod shapes;
 mod table;
@@ -35,17 +36,19 @@ mod text;
 mod unit;
 mod write;
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub(crate) use cell::plain;
 pub use follow::Alignment;
 pub(crate) use form::Separator;
 pub(crate) use heading::{Heading, Stated};
-pub use map::{Map, Part};
+pub use map::{Map, MappedColumn};
 pub use nominal::Nominal;
 pub use positioning::{BothWays, OneWay, Positioning};
+pub use request::Request;
 pub use write::Written;
+
+use serde::{Deserialize, Serialize};
 
 use crate::columnar::{Form, START};
 use crate::error::{Error, Place, Result};
@@ -53,52 +56,9 @@ use crate::machine::Machine;
 use map::Known;
 use table::{Table, Told};
 
-/// What is known of a table besides what it says itself.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Request {
-    /// The file of a map, which then says everything; the fields below, but for the joint, are not asked.
-    pub map: Option<PathBuf>,
-    /// What was measured: `position`, `pose`, `joint`, `distance` or `displacement`; `r-test` where linear axes followed a ball.
-    pub measurement: Option<String>,
-    /// Columns of the recording and the columns of the table that they are; `q*` for all joints of such names.
-    pub columns: Vec<(String, String)>,
-    /// Units by column of the table, or by `length`, `angle`, `time` for all that name none.
-    pub units: Vec<(String, String)>,
-    /// Lines `key: value` for the head of the recording.
-    pub head: Vec<String>,
-    /// Columns and the text that a row must have there to be taken.
-    pub rows: BTreeMap<String, String>,
-    /// Names of all columns, in the place of headings.
-    pub names: Vec<String>,
-    /// Markers that are taken, where a row has several; all where none is named.
-    pub markers: Vec<String>,
-    /// Convention of Euler angles, such as `zyx-intrinsic`.
-    pub euler: Option<String>,
-    /// Whether `rx ry rz` are a rotation vector.
-    pub rotation_vector: bool,
-    /// `row-major` or `column-major`, where a matrix does not tell by itself.
-    pub matrix: Option<String>,
-    /// Time stamp at which `t` is 0.
-    pub time_zero: Option<String>,
-    /// The joint that a file of a laser is about.
-    pub joint: Option<String>,
-    /// From which side the targets of a laser were approached: `alternating`, `rising` or `falling`.
-    pub approach: Option<String>,
-    /// What deviations are: of a laser `laser-minus-target` or `target-minus-laser`, of an R-test `ball-minus-tool` or `tool-minus-ball`.
-    pub deviation: Option<String>,
-    /// What separates columns: `comma`, `semicolon`, `tab`, `blanks`.
-    pub separator: Option<String>,
-    /// `point` or `comma`.
-    pub decimal: Option<String>,
-    /// The path that ran, where the table has no positions of the joints.
-    pub path: Option<Nominal>,
-    /// Readings a second, where such a table has no column of time.
-    pub sample_rate: Option<f64>,
-}
-
 /// Recordings that were made of a table.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Converted {
     /// One for each marker.
     pub recordings: Vec<Written>,

@@ -7,8 +7,10 @@
 mod along;
 mod approaches;
 mod blocks;
+mod cell_sums;
 mod cells;
 mod coarse;
+mod compare;
 mod contained;
 mod course;
 mod curves;
@@ -17,7 +19,9 @@ mod diagnosis;
 mod discrepancy;
 mod elsewhere;
 mod enter;
+mod equations;
 mod evidence;
+mod features;
 mod finding;
 mod folds;
 mod held_out;
@@ -26,6 +30,7 @@ mod leftover;
 mod linear;
 mod marginal;
 mod model;
+mod nameless;
 mod names;
 mod noise;
 mod not_tried;
@@ -36,6 +41,7 @@ mod outliers;
 mod panel;
 mod parts;
 mod passing;
+mod pictures;
 mod placebo;
 mod polish;
 mod propose;
@@ -43,6 +49,7 @@ mod reach;
 mod refine;
 mod relinearised;
 mod report;
+mod rms;
 mod rounds;
 mod score;
 mod search;
@@ -53,8 +60,10 @@ mod shares;
 mod side_branches;
 mod spectrum;
 mod speeds;
+mod steps;
 mod stretch;
 mod sums;
+mod terms;
 mod traces;
 mod unexplained;
 mod unfold;
@@ -63,21 +72,16 @@ mod whereabouts;
 mod whitener;
 
 inner! {
-    use traces::{Along, Curve, CurvePoint, Trace, Traces};
+    use pictures::{Along, Curve, CurvePoint, Trace, Traces};
 }
-pub use approaches::{SaidBy, StandsStill};
-pub use diagnosis::{Diagnosis, HeldOutRms, RmsByModel, Thinned};
-pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size};
-pub use names::LikelyName;
+pub use diagnosis::{
+    Companion, Diagnosis, HeldOutRms, LeftOutRms, Outliers, RmsByModel, SaidBy, SetUpLeftOut, StandsStill,
+    Thinned, WithoutOutliers,
+};
+pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size, Where};
+pub use nameless::{Gathering, LikelyName, Proposal, Unexplained, UnnamedPart};
 pub use not_tried::NotTried;
-pub use outliers::{Outliers, WithoutOutliers};
-pub use parts::UnnamedPart;
-pub use propose::Proposal;
-pub use set_ups::{LeftOutRms, SetUpLeftOut};
-pub use shared::Companion;
 pub use side_branches::UnseenSideBranch;
-pub use stretch::Where;
-pub use unexplained::{Gathering, Unexplained};
 
 use crate::effects::{Library, RecordingFacts};
 use crate::error::Result;

@@ -24,13 +24,14 @@ mod vectors;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Place, Result};
 use crate::import::Ends;
 
 /// The form of an exported file.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Location errors under their names of ISO 230-1, a CSV table.
@@ -108,7 +109,31 @@ pub struct ExportOptions {
     pub base_file: Option<BaseFile>,
 }
 
+impl ExportOptions {
+    /// With a tool of this length from the gauge line of the spindle, m.
+    #[must_use]
+    pub fn with_tool_length(mut self, tool_length: f64) -> Self {
+        self.tool_length = tool_length;
+        self
+    }
+
+    /// Of this axis.
+    #[must_use]
+    pub fn with_axis(mut self, axis: impl Into<String>) -> Self {
+        self.axis = Some(axis.into());
+        self
+    }
+
+    /// Into this description.
+    #[must_use]
+    pub fn with_base_file(mut self, base_file: BaseFile) -> Self {
+        self.base_file = Some(base_file);
+        self
+    }
+}
+
 /// A description whose origins are written anew.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BaseFile {
     /// Its path, or the name that messages use.
@@ -120,6 +145,11 @@ pub struct BaseFile {
 }
 
 impl BaseFile {
+    /// A description by its text; `file` is the name that messages use.
+    pub fn new(file: impl Into<PathBuf>, text: impl Into<String>, ends: Ends) -> BaseFile {
+        BaseFile { file: file.into(), text: text.into(), ends }
+    }
+
     /// Reads a description.
     ///
     /// # Errors
@@ -142,7 +172,7 @@ impl BaseFile {
 
 /// A number as it stands in an exported file.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Number {
     /// Its name there.
     pub name: String,
@@ -159,7 +189,7 @@ pub struct Number {
 
 /// Something about the calibrated machine that the format cannot hold.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Remainder {
     /// What it is.
     pub what: String,
@@ -173,7 +203,7 @@ pub struct Remainder {
 
 /// A calibrated machine in another form.
 #[non_exhaustive]
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Exported {
     /// The file.
     #[serde(skip)]

@@ -49,7 +49,7 @@ pub use judge::{Figures, PieceFit};
 pub use loss::Loss;
 pub(crate) use optimum::{optimum, sources};
 pub use options::{Approach, CalibrateOptions, ErrorModel};
-pub use partial::{Merged, Part, Round, merge};
+pub use partial::{Merged, PartialEquations, Round, merge};
 pub(crate) use places::Places;
 pub(crate) use plausible::by_commands;
 pub use plausible::{Plausibility, as_declared, worst};

@@ -21,6 +21,8 @@ mod xml;
 
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::{Error, Place, Result};
 use crate::machine::{FileUnits, Machine};
 
@@ -46,12 +48,29 @@ pub enum Form {
 }
 
 /// Which part of a description becomes the machine.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ends {
     /// Link or body that carries the workpiece frame `w`; the root where nothing is said.
     pub base: Option<String>,
     /// Link, body or site that is the tool frame `t`; the only end of a chain where nothing is said.
     pub tip: Option<String>,
+}
+
+impl Ends {
+    /// From this link or body.
+    #[must_use]
+    pub fn with_base(mut self, base: impl Into<String>) -> Self {
+        self.base = Some(base.into());
+        self
+    }
+
+    /// To this link, body or site.
+    #[must_use]
+    pub fn with_tip(mut self, tip: impl Into<String>) -> Self {
+        self.tip = Some(tip.into());
+        self
+    }
 }
 
 /// What is known of a description besides what it says itself.
@@ -70,13 +89,58 @@ pub struct ImportOptions {
     pub beside: Vec<Beside>,
 }
 
+impl ImportOptions {
+    /// A description of this form.
+    #[must_use]
+    pub fn with_form(mut self, form: Form) -> Self {
+        self.form = Some(form);
+        self
+    }
+
+    /// This part of it.
+    #[must_use]
+    pub fn with_ends(mut self, ends: Ends) -> Self {
+        self.ends = ends;
+        self
+    }
+
+    /// With a HAL file besides.
+    #[must_use]
+    pub fn with_hal(mut self, file: impl Into<PathBuf>) -> Self {
+        self.hal.push(file.into());
+        self
+    }
+
+    /// With a tool of this length from the gauge line of the spindle, m.
+    #[must_use]
+    pub fn with_tool_length(mut self, tool_length: f64) -> Self {
+        self.tool_length = tool_length;
+        self
+    }
+
+    /// With the text of a file that the description names.
+    #[must_use]
+    pub fn with_beside(mut self, beside: Beside) -> Self {
+        self.beside.push(beside);
+        self
+    }
+}
+
 /// A file beside a description.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Beside {
     /// Its path, as the description leads to it.
     pub file: PathBuf,
     /// Its text.
     pub text: String,
+}
+
+impl Beside {
+    /// The file that the description calls so, with its text.
+    pub fn new(file: impl Into<PathBuf>, text: impl Into<String>) -> Self {
+        Beside { file: file.into(), text: text.into() }
+    }
 }
 
 impl From<Ends> for ImportOptions {
@@ -87,7 +151,8 @@ impl From<Ends> for ImportOptions {
 
 /// A machine that was read from a foreign description.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "ImportedForm", into = "ImportedForm")]
 pub struct Imported {
     /// The machine.
     pub machine: Machine,
@@ -97,6 +162,28 @@ pub struct Imported {
     pub told: Vec<String>,
     /// Files that were read besides, as the description leads to them.
     pub beside: Vec<PathBuf>,
+}
+
+/// A machine stands in it as its file.
+#[derive(Serialize, Deserialize)]
+struct ImportedForm {
+    text: String,
+    told: Vec<String>,
+    beside: Vec<PathBuf>,
+}
+
+impl From<Imported> for ImportedForm {
+    fn from(Imported { machine: _, text, told, beside }: Imported) -> Self {
+        ImportedForm { text, told, beside }
+    }
+}
+
+impl TryFrom<ImportedForm> for Imported {
+    type Error = Error;
+
+    fn try_from(ImportedForm { text, told, beside }: ImportedForm) -> Result<Self> {
+        Ok(Imported { machine: Machine::parse("imported", &text)?, text, told, beside })
+    }
 }
 
 /// Reads the description at `path`, of whatever form it is.
@@ -150,8 +237,7 @@ pub fn read(file: impl AsRef<Path>, text: &str, ends: &Ends) -> Result<Imported>
 /// ```
 /// use kincal::import::{Form, ImportOptions, read_with};
 ///
-/// let mut options = ImportOptions::default();
-/// options.form = Some(Form::Dh);
+/// let options = ImportOptions::default().with_form(Form::Dh);
 /// let arm = read_with("scara.csv", "joint,kind,theta[deg],d[mm],a[mm],alpha[deg]\n\
 ///     shoulder,revolute,0,387,325,0\n\
 ///     elbow,revolute,0,0,275,180\n\

@@ -171,6 +171,7 @@ impl<'a> Inverse<'a> {
     }
 
     /// In this mode, whatever the machine has.
+    #[must_use]
     pub fn with_mode(&self, mode: Mode) -> Self {
         let mut inverse = Inverse { mode, ..self.clone() };
         (_, inverse.turns, inverse.shifts, inverse.by_slides) = inverse.ranks();
@@ -178,6 +179,7 @@ impl<'a> Inverse<'a> {
     }
 
     /// With other limits.
+    #[must_use]
     pub fn with_options(&self, options: InverseOptions) -> Self {
         Inverse { options, ..self.clone() }
     }

@@ -32,7 +32,7 @@
 //! | `document` | RON texts, and where in them each value stands |
 //! | [`machine`] | dyads, joints, the machine file |
 //! | [`chain`] | poses and Jacobian rows of a machine with given deviations |
-//! | `sensor` | what instruments read, and how that depends on every unknown |
+//! | [`sensor`] | what instruments read, and how that depends on every unknown |
 //! | `check` | every Jacobian against forward-mode autodiff |
 //! | `columnar` | tables in columns, Parquet and Arrow, as text and back (feature `columnar`) |
 //! | [`recording`] | CSV recordings, streamed |

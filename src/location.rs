@@ -47,6 +47,7 @@ const PARALLEL: f64 = 0.1;
 const TIE: f64 = 1e-6;
 
 /// What is known of a smooth function of the deviations, in its own unit squared. To first order, `docs/model.md` (24), (28).
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Functional {
     /// Variance that the tolerances alone allow.

@@ -19,7 +19,7 @@ mod unsettled;
 
 pub use change::Change;
 pub use moved::Moved;
-pub use nonsense::{Apart, Mistake, Nonsense};
+pub use nonsense::{Apart, LikelyMistake, Nonsense};
 pub use odd::{Odd, odd};
 pub use search::{nonsense, search};
 pub use unsettled::Unsettled;

@@ -21,24 +21,29 @@ pub trait Scalar:
     Copy + Debug + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
     /// The constant `value`, of the same kind as `self`; a dual's derivative part is zero.
+    #[must_use]
     fn lift(self, value: f64) -> Self;
 
     /// `self * factor + addend`; rounded once where an instruction for that is at hand.
     #[inline(always)]
+    #[must_use]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         self * factor + addend
     }
 
     /// Square root. The argument must be positive where a derivative is wanted.
+    #[must_use]
     fn sqrt(self) -> Self;
 
     /// `1 / self`.
+    #[must_use]
     fn recip(self) -> Self;
 
     /// Sine and cosine of an angle in rad.
     fn sin_cos(self) -> (Self, Self);
 
     /// `e` to the power of `self`.
+    #[must_use]
     fn exp(self) -> Self;
 
     /// Sines and cosines of a whole column of angles in rad.
@@ -52,19 +57,23 @@ pub trait Scalar:
     }
 
     /// Angle in rad of the point (`x`, `self`), as [`f64::atan2`].
+    #[must_use]
     fn atan2(self, x: Self) -> Self;
 
     /// `below` where `self < limit`, `otherwise` elsewhere; for duals the real part decides.
+    #[must_use]
     fn select_below(self, limit: f64, below: Self, otherwise: Self) -> Self;
 
     /// `self * factor`.
     #[inline(always)]
+    #[must_use]
     fn scale(self, factor: f64) -> Self {
         self * self.lift(factor)
     }
 
     /// `self + value`.
     #[inline(always)]
+    #[must_use]
     fn offset(self, value: f64) -> Self {
         self + self.lift(value)
     }

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::calibration::CalibratedMachine;
 use crate::compensate::{
-    Beyond, CompensateOptions, Listed, Report, Setup, UnknownAxes, UnknownWay, Verification, VerifyOptions,
-    compensate, verify_written,
+    CompensateOptions, ExtrapolatedJoint, Listed, Report, Setup, UnknownAxes, UnknownWay, Verification,
+    VerifyOptions, compensate, verify_written,
 };
 use crate::inverse::Mode;
 
@@ -215,7 +215,7 @@ fn held(found: Verification, program: &Path, name: &Path) -> Outcome<Verificatio
     })
 }
 
-fn joint_unit(beyond: &Beyond) -> fn(f64) -> String {
+fn joint_unit(beyond: &ExtrapolatedJoint) -> fn(f64) -> String {
     if beyond.rotary { angle } else { length }
 }
 
@@ -370,7 +370,9 @@ fn notes(r: &Report) -> String {
         );
     }
     if r.extrapolated_moves > 0 {
-        let by = |beyond: &Beyond| format!("{} by up to {}", beyond.joint, at(beyond.by, joint_unit(beyond)));
+        let by = |beyond: &ExtrapolatedJoint| {
+            format!("{} by up to {}", beyond.joint, at(beyond.by, joint_unit(beyond)))
+        };
         let joints: Vec<String> = r.extrapolated_joints.iter().map(by).collect();
         let _ = writeln!(
             text,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::identify::{CalibrateOptions, Fit, Merged, Part, Plausibility, merge};
+use crate::identify::{CalibrateOptions, Fit, Merged, PartialEquations, Plausibility, merge};
 
 use super::Common;
 use super::calibrate::{render, write_machine};
@@ -39,7 +39,7 @@ struct Told<'a> {
 }
 
 pub(crate) fn run(args: &Args) -> Outcome {
-    let parts = args.parts.iter().map(Part::open).collect::<Result<Vec<_>, _>>()?;
+    let parts = args.parts.iter().map(PartialEquations::open).collect::<Result<Vec<_>, _>>()?;
     match merge(&parts, CalibrateOptions::default())? {
         Merged::Another(round) => {
             write_whole(&args.output, |out| {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::identify::{Part, Round};
+use crate::identify::{PartialEquations, Round};
 use crate::machine::Machine;
 
 use super::Common;
@@ -54,7 +54,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
     let progress = args.common.progress();
     progress.say("summing");
-    let part = Part::of(&machine, &recordings, round.as_ref())?;
+    let part = PartialEquations::of(&machine, &recordings, round.as_ref())?;
     drop(progress);
     write_whole(&args.output, |out| {
         // Watched: an error here is told of the output.

@@ -4,6 +4,7 @@ use crate::inverse::Mode;
 use crate::nc::Dialect;
 
 /// What becomes of a move that needs the word of an axis of which it is not known where it stands.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnknownAxes {
     /// The move is refused, rapid or not.
@@ -13,6 +14,7 @@ pub enum UnknownAxes {
 }
 
 /// What an axis number without a decimal point counts in an RS-274 program.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegerUnit {
     /// Millimetres and degrees, as with LinuxCNC: `X10` is `X10.`

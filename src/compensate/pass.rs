@@ -16,7 +16,8 @@ use super::part::Part;
 use super::position::Position;
 use super::refusal::refuse;
 use super::report::{
-    Beyond, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, UnseenPiece, Worst,
+    ExtrapolatedJoint, Report, Reversal, SingularBlock, UnknownPlace, UnknownWay, Unreached, UnseenPiece,
+    Worst,
 };
 use super::standing::Standing;
 use super::style::{Style, plain};
@@ -265,7 +266,11 @@ impl<'a, 'm> Pass<'a, 'm> {
                 Some(beyond) => beyond.by.take(by, line),
                 None => {
                     let by = Worst { value: by, line };
-                    self.told.report.extrapolated_joints.push(Beyond { joint: joint.clone(), rotary, by });
+                    self.told.report.extrapolated_joints.push(ExtrapolatedJoint {
+                        joint: joint.clone(),
+                        rotary,
+                        by,
+                    });
                 }
             }
             joints.push(joint);

@@ -86,7 +86,7 @@ pub struct UnseenPiece {
 /// A joint that leaves the range in which the calibration has seen it.
 #[non_exhaustive]
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Beyond {
+pub struct ExtrapolatedJoint {
     /// Name of the joint.
     pub joint: String,
     /// Whether it turns.
@@ -206,7 +206,7 @@ pub struct Report {
     pub extrapolated_moves: u64,
     /// Joints that leave what the calibration has seen, and how far they do.
     #[serde(default)]
-    pub extrapolated_joints: Vec<Beyond>,
+    pub extrapolated_joints: Vec<ExtrapolatedJoint>,
     /// Addresses that the program never names; their joints were taken where they stand at the start, and
     /// left there.
     pub never_programmed: Vec<String>,

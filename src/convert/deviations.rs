@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::Request;
 use super::heading::Heading;
-use super::map::{Map, Part};
+use super::map::{Map, MappedColumn};
 use super::positioning::{Positioning, Reading};
 use super::table::{Row, Table};
 use crate::error::{Error, Place, Result};
@@ -54,9 +54,9 @@ impl Deviations {
             separator: None,
             decimal_comma: false,
         };
-        let part = |to: String, k: usize, unit: Option<&str>| Part {
+        let part = |to: String, k: usize, unit: Option<&str>| MappedColumn {
             unit: unit.map(str::to_string),
-            ..Part::new(to, &headings[k])
+            ..MappedColumn::new(to, &headings[k])
         };
         let joint = &self.joint;
         let map = Map {

@@ -2,7 +2,7 @@
 
 use super::Request;
 use super::heading::{Heading, Stated};
-use super::map::{Map, Part};
+use super::map::{Map, MappedColumn};
 use super::plan::is_clock;
 use super::table::{Found, Table};
 use super::target::quantity;
@@ -51,7 +51,7 @@ impl<'a> Draft<'a> {
 
     /// Takes a column of the table as a column of the recording.
     pub fn take(&mut self, to: &str, column: usize, marker: Option<&str>) {
-        let mut part = Part::new(to, self.table.reference(column));
+        let mut part = MappedColumn::new(to, self.table.reference(column));
         part.marker = marker.map(str::to_string);
         part.unit = self.unit(to, column);
         self.map.columns.push(part);

@@ -1,11 +1,11 @@
 //! A table without positions of the joints gets them from the path that ran.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::align::{self, Found, Readings, SETTLED};
 use super::cell;
 use super::heading::Heading;
-use super::map::{Known, Part};
+use super::map::{Known, MappedColumn};
 use super::moment;
 use super::nominal::Nominal;
 use super::plan::{Kind, Plan, Source};
@@ -27,7 +27,7 @@ const FURTHEST: f64 = 0.5;
 
 /// Where a path lies in readings that came without positions, and how sure that is.
 #[non_exhaustive]
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Alignment {
     /// When the path begins, from the first reading, s.
     pub start_s: f64,
@@ -207,7 +207,10 @@ pub(super) fn follow(
     let mut parts = Vec::new();
     let mut heading = |to: &str, unit: &str| {
         table.headings.push(Heading::read(&format!("{to} of the path [{unit}]")));
-        parts.push(Part { unit: Some(unit.into()), ..Part::new(to, format!("#{}", table.headings.len())) });
+        parts.push(MappedColumn {
+            unit: Some(unit.into()),
+            ..MappedColumn::new(to, format!("#{}", table.headings.len()))
+        });
     };
     if time {
         heading("t", "s");

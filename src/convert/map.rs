@@ -42,13 +42,13 @@ pub struct Map {
     #[serde(default)]
     pub time_zero: Option<String>,
     /// The columns that are taken.
-    pub columns: Vec<Part>,
+    pub columns: Vec<MappedColumn>,
 }
 
 /// One column of the recording and where it comes from: number × `times` + `plus`, in `unit`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Part {
+#[serde(rename = "Part", deny_unknown_fields)]
+pub struct MappedColumn {
     /// Name in the recording, or `euler1`, `matrix23` (row 2, column 3).
     pub to: String,
     /// Heading in the table, or `#3` for the third column.
@@ -71,9 +71,9 @@ fn one() -> f64 {
     1.0
 }
 
-impl Part {
-    pub(super) fn new(to: impl Into<String>, from: impl Into<String>) -> Part {
-        Part { to: to.into(), from: from.into(), unit: None, times: 1.0, plus: 0.0, marker: None }
+impl MappedColumn {
+    pub(super) fn new(to: impl Into<String>, from: impl Into<String>) -> MappedColumn {
+        MappedColumn { to: to.into(), from: from.into(), unit: None, times: 1.0, plus: 0.0, marker: None }
     }
 }
 

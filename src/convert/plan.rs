@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::map::{Known, Part};
+use super::map::{Known, MappedColumn};
 use super::rotation::{CONVENTIONS, Euler};
 use super::table::{Found, Table};
 use super::target::{Target, quantity};
@@ -156,7 +156,7 @@ enum Piece {
     Matrix(usize, usize),
 }
 
-fn check_name(known: &Known, at: &str, part: &Part) -> Result<()> {
+fn check_name(known: &Known, at: &str, part: &MappedColumn) -> Result<()> {
     let bad = |c: char| c.is_control() || ",[]\"#".contains(c);
     let name = part.to.trim();
     if name.is_empty() || name != part.to || name.contains(bad) {
@@ -204,7 +204,13 @@ fn find(known: &Known, at: &str, text: &str, table: &Table) -> Result<usize> {
     }
 }
 
-fn source(known: &Known, at: &str, part: &Part, table: &Table, machine: Option<&Machine>) -> Result<Source> {
+fn source(
+    known: &Known,
+    at: &str,
+    part: &MappedColumn,
+    table: &Table,
+    machine: Option<&Machine>,
+) -> Result<Source> {
     let column = find(known, &format!("{at}.from"), &part.from, table)?;
     let expected = quantity(&part.to, machine);
     let fits = || expected.map_or("a unit of docs/recordings.md".to_string(), Unit::symbols_of);

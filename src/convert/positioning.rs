@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What was read at a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,12 +25,12 @@ pub(super) struct Reading {
 ///
 /// `x̄_i↑`, `s_i↑`: mean and standard uncertainty of the deviations (actual less target) at target i, approached in the positive sense.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Positioning {
     /// The joint.
     pub joint: String,
     /// Unit of all figures, `m` or `rad`.
-    pub unit: &'static str,
+    pub unit: String,
     /// How many targets there are.
     pub targets: usize,
     /// Fewest readings at a target, approached in the positive and in the negative sense.
@@ -45,7 +45,7 @@ pub struct Positioning {
 
 /// Unidirectional figures, m or rad.
 #[non_exhaustive]
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OneWay {
     /// A↑ or A↓, accuracy; `None` where a target was read only once.
     pub accuracy: Option<f64>,
@@ -57,7 +57,7 @@ pub struct OneWay {
 
 /// Bidirectional figures, m or rad.
 #[non_exhaustive]
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BothWays {
     /// A, accuracy; `None` where a target was read only once in a sense.
     pub accuracy: Option<f64>,
@@ -108,7 +108,7 @@ impl Positioning {
         let (up, down) = (way(0), way(1));
         Positioning {
             joint: joint.into(),
-            unit: if angular { "rad" } else { "m" },
+            unit: if angular { "rad" } else { "m" }.into(),
             targets: all.len(),
             runs: [fewest(0), fewest(1)],
             forward: up.as_deref().and_then(OneWay::of),

@@ -13,7 +13,7 @@ use super::draft::Draft;
 use super::guess;
 use super::heading::Heading;
 use super::joints;
-use super::map::{Known, Map, Part};
+use super::map::{Known, Map, MappedColumn};
 use super::plan::Plan;
 use super::table::{Row, Table};
 use crate::chain::Chain;
@@ -297,11 +297,13 @@ fn finished(
         }
     }
     names.extend(["px", "py", "pz"].map(|name| (name.to_string(), "mm".to_string())));
-    let mut columns: Vec<Part> = Vec::new();
+    let mut columns: Vec<MappedColumn> = Vec::new();
     let mut headings: Vec<Heading> = Vec::new();
     for (name, unit) in &names {
-        columns
-            .push(Part { unit: Some(unit.clone()), ..Part::new(name, format!("#{}", headings.len() + 1)) });
+        columns.push(MappedColumn {
+            unit: Some(unit.clone()),
+            ..MappedColumn::new(name, format!("#{}", headings.len() + 1))
+        });
         headings.push(Heading::read(&format!("{name} [{unit}]")));
     }
     let kept = map
@@ -309,10 +311,10 @@ fn finished(
         .iter()
         .filter(|part| !commands.contains(&part.to) && !["px", "py", "pz"].contains(&part.to.as_str()));
     // In the order of the plan: time first.
-    let mut kept: Vec<&Part> = kept.collect();
+    let mut kept: Vec<&MappedColumn> = kept.collect();
     kept.sort_by_key(|part| part.to != "t");
     for part in kept {
-        columns.push(Part { from: format!("#{}", headings.len() + 1), ..part.clone() });
+        columns.push(MappedColumn { from: format!("#{}", headings.len() + 1), ..part.clone() });
         headings.push(Heading::read(&part.from));
     }
     let head =

@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use serde::{Deserialize, Serialize};
+
 use super::cell;
 use super::map::Known;
 use super::moment::{self, Moment};
@@ -15,7 +17,7 @@ use crate::wording::shown;
 
 /// One recording of a table.
 #[non_exhaustive]
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Written {
     /// The marker that was measured, where a row of the table has several.
     pub marker: Option<String>,

@@ -1,40 +1,12 @@
 //! From which side a joint came that stands still all through a recording, as the readings say it: `docs/diagnosis-method.md` (73).
 
-use serde::{Deserialize, Serialize};
-
+use super::diagnosis::{SaidBy, StandsStill};
 use super::held_out::Model;
-use super::search::{ModelTerm, Search};
+use super::search::Search;
+use super::terms::ModelTerm;
 use crate::feature::{Feature, Samples};
 use crate::identify::Approach;
 use crate::machine::Machine;
-
-/// A joint that stands still all through a recording.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StandsStill {
-    /// File name.
-    pub recording: String,
-    /// Name of the joint.
-    pub at: String,
-    /// The side from which it came there, as the readings say: 1 rising, -1 falling.
-    pub direction: i8,
-    /// What would say so in the recording itself; `None` where the joint follows several commands.
-    #[serde(flatten)]
-    pub said_by: Option<SaidBy>,
-    /// Where that is, by recording and dyad.
-    #[serde(skip)]
-    pub(super) approach: Approach,
-}
-
-/// A column that says from which side a joint came.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SaidBy {
-    /// Its heading, `<command>_direction[1]`.
-    pub column: String,
-    /// Its value in every row, 1 or -1.
-    pub value: i8,
-}
 
 /// Sides of approach of all joints that stand still, and have an effect that depends on it. What was found of how the effect was before
 /// anybody looked is compared with what either side would be; the middle is no side.

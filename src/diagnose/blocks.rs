@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::coarse::{AtPoint, Features, Level};
+use super::coarse::Level;
+use super::equations::{BATCH, Best, Equations, best, is_of_number, judge, key, lengths, unit};
+use super::features::{AtPoint, Features};
 use super::marginal::Marginal;
-use super::score::{BATCH, Best, Equations, Field, Rows, best, is_of_number, judge, key, lengths, unit};
+use super::score::{Field, Rows};
 use crate::effects::Candidate;
 use crate::lie::Twist;
 use crate::variation::Slot;

@@ -5,7 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::discrepancy;
 use super::marginal::{Marginal, gram};
-use super::search::{Hypothesis, ModelTerm, Search};
+use super::search::Search;
+use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Candidate;
 
 /// What a wider name adds is next to nothing below this part of what it does, root mean square in m and rad; and below this part where the

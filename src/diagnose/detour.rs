@@ -2,7 +2,8 @@
 
 use std::sync::Mutex;
 
-use super::search::{ENTER, ModelTerm, Search};
+use super::search::{ENTER, Search};
+use super::terms::ModelTerm;
 
 /// Logarithm of what is expected of a candidate that has to stand aside.
 const ASIDE: f64 = -1e9;

@@ -2,23 +2,17 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::approaches::StandsStill;
 use super::finding::Finding;
+use super::nameless::{Proposal, Unexplained, library_text};
 use super::not_tried::NotTried;
-use super::outliers::{Outliers, WithoutOutliers};
-use super::propose::{Proposal, library_text};
-use super::search::Search;
-use super::set_ups::SetUpLeftOut;
-use super::shared::Companion;
+use super::pictures::Traces;
 use super::side_branches::UnseenSideBranch;
-use super::traces::Traces;
-use super::unexplained::Unexplained;
 use crate::effects::StoredEffect;
-use crate::identify::{BeforeAfter, FarOff};
+use crate::identify::{Approach, FarOff};
 use crate::location::LocationErrors;
 use crate::units::{ByQuantity, field_by_quantity};
 
-field_by_quantity!(noise_floor, rms, held_out_rms, rms_without_outliers);
+field_by_quantity!(noise_floor, rms, held_out_rms, rms_without_outliers, largest);
 
 /// Everything that a diagnosis has to say. Numbers in SI; `docs/commands.md` lists the fields.
 #[non_exhaustive]
@@ -152,23 +146,91 @@ fn is_zero(count: &u64) -> bool {
     *count == 0
 }
 
-pub(super) fn by_model(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<RmsByModel> {
-    let (fit, last) = (fit?, last?);
-    Some(RmsByModel { nominal: fit.nominal, geometric: fit.geometric, r#final: last })
+/// Samples of one recording that lie far off their surroundings whatever is taken away.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Outliers {
+    /// File name.
+    pub recording: String,
+    /// Their lines in the file.
+    pub lines: Vec<u64>,
+    /// The largest departure.
+    #[serde(flatten, with = "largest")]
+    pub largest: ByQuantity<Option<f64>>,
 }
 
-/// Root mean square over samples of the norm of residual lengths or angles.
-pub(super) fn rms_of(search: &Search, residual: &[f64], angle: bool) -> Option<f64> {
-    let all: Vec<usize> = (0..residual.len()).collect();
-    rms_of_rows(search, residual, angle, &all)
+/// RMS of all samples but outliers.
+#[non_exhaustive]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct WithoutOutliers {
+    /// With constant deviations.
+    pub geometric: f64,
+    /// With what was found besides.
+    pub r#final: f64,
 }
 
-/// The same over these rows.
-pub(super) fn rms_of_rows(search: &Search, residual: &[f64], angle: bool, rows: &[usize]) -> Option<f64> {
-    let linear = search.rows.linear;
-    let rows = || rows.iter().copied().filter(|row| linear.angle[*row] == angle);
-    let mut samples: Vec<usize> = rows().map(|row| linear.sample[row]).collect();
-    samples.dedup();
-    let squares: f64 = rows().map(|row| residual[row] * residual[row]).sum();
-    (!samples.is_empty()).then(|| (squares / samples.len() as f64).sqrt())
+/// A joint that stands still all through a recording.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StandsStill {
+    /// File name.
+    pub recording: String,
+    /// Name of the joint.
+    pub at: String,
+    /// The side from which it came there, as the readings say: 1 rising, -1 falling.
+    pub direction: i8,
+    /// What would say so in the recording itself; `None` where the joint follows several commands.
+    #[serde(flatten)]
+    pub said_by: Option<SaidBy>,
+    /// Where that is, by recording and dyad.
+    #[serde(skip)]
+    pub(super) approach: Approach,
+}
+
+/// A column that says from which side a joint came.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SaidBy {
+    /// Its heading, `<command>_direction[1]`.
+    pub column: String,
+    /// Its value in every row, 1 or -1.
+    pub value: i8,
+}
+
+/// What is left of one set-up when all others say what the machine is like.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SetUpLeftOut {
+    /// Its name.
+    pub setup: String,
+    /// How many samples it has.
+    pub samples: u64,
+    /// RMS of its samples.
+    #[serde(flatten, with = "rms")]
+    pub rms: ByQuantity<Option<LeftOutRms>>,
+}
+
+/// RMS of a set-up left out under three models.
+#[non_exhaustive]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct LeftOutRms {
+    /// With constant deviations.
+    pub geometric: f64,
+    /// With what was found besides.
+    pub r#final: f64,
+    /// With as many numbers that multiply meaningless causes, where there is such a thing for an effect.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub placebo: Option<f64>,
+}
+
+/// A joint that has an effect of the findings too, so little that it is no finding; the model has it.
+#[non_exhaustive]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Companion {
+    /// Name of the effect.
+    pub effect: String,
+    /// Name of the place.
+    pub at: String,
+    /// Whether it comes anew with every set-up; else every joint has it more or less.
+    pub of_set_up: bool,
 }

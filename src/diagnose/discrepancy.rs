@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::curves::{column, product};
 use super::marginal::gram;
 use super::score::Rows;
-use super::search::ModelTerm;
+use super::terms::ModelTerm;
 use crate::effects::{Candidate, Place};
 use crate::feature::{Feature, Samples};
 use crate::lie::Twist;

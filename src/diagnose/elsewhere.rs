@@ -1,6 +1,7 @@
 //! All that is told as one effect of a joint, at another joint together, `docs/diagnosis-method.md` (80).
 
-use super::search::{ModelTerm, Search};
+use super::search::Search;
+use super::terms::ModelTerm;
 use crate::effects::Place;
 
 impl Search<'_> {

@@ -5,11 +5,12 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::discrepancy;
+use super::equations::Score;
 use super::evidence::likely_part;
-use super::marginal::{Marginal, with_prior};
+use super::marginal::{Marginal, solved};
 use super::refine::refine;
-use super::score::Score;
-use super::search::{Hypothesis, ModelTerm, Search};
+use super::search::Search;
+use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Candidate;
 use crate::feature::Feature;
 
@@ -124,9 +125,4 @@ impl Search<'_> {
         let gram = columns.tr_mul(columns) - along.tr_mul(&along);
         (gram, columns.tr_mul(&marginal.apply(&self.rows.residual)))
     }
-}
-
-/// Coefficients from normal equations, with their prior.
-pub(super) fn solved(gram: DMatrix<f64>, toward: &DVector<f64>) -> Option<DVector<f64>> {
-    Some(with_prior(gram)?.solve(toward))
 }

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::stretch::Where;
 use crate::units::{ByQuantity, field_by_quantity};
 
 field_by_quantity!(held_out_rms);
@@ -110,4 +109,20 @@ pub struct HeldOutPair {
     pub before: f64,
     /// This one too.
     pub after: f64,
+}
+
+/// A stretch of a recording.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Where {
+    /// File name.
+    pub recording: String,
+    /// Start, s; absent without time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
+    /// End, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_s: Option<f64>,
+    /// Part of what geometry leaves over.
+    pub share_of_misfit: f64,
 }

@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::diagnosis::{Diagnosis, HeldOutRms, rms_of};
+use super::diagnosis::{Diagnosis, HeldOutRms};
 use super::finding::HeldOutPair;
 use super::marginal::{gram, with_prior};
 use super::noise::Noise;
-use super::search::{ModelTerm, Search, all_but};
+use super::rms::rms_of;
+use super::search::Search;
+use super::terms::{ModelTerm, all_but};
 use crate::feature::Samples;
 use crate::units::{ByQuantity, Quantity};
 

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::marginal::{gram, with_prior};
-use super::search::{ModelTerm, Search};
+use super::search::Search;
+use super::terms::ModelTerm;
 use crate::effects::{Candidate, Identified, Library};
 
 /// Constant deviations and effects solved together.

@@ -138,6 +138,11 @@ pub(super) fn gram(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     a.transpose() * b
 }
 
+/// Coefficients from normal equations, with their prior.
+pub(super) fn solved(gram: DMatrix<f64>, toward: &DVector<f64>) -> Option<DVector<f64>> {
+    Some(with_prior(gram)?.solve(toward))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

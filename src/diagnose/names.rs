@@ -9,15 +9,15 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 use super::contained::says_no_more;
-use super::enter::solved;
 use super::evidence::{evidence, log_mean_exp, log_sum_exp};
-use super::marginal::Marginal;
+use super::marginal::{Marginal, solved};
+use super::nameless::LikelyName;
 use super::odds::LISTED;
 use super::parts::{Unnamed, is_foretold};
-use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
+use super::search::Search;
+use super::terms::{Hypothesis, ModelTerm, side_by_side};
 use crate::feature::Dependence;
 
 /// Parts of its size by which the shape of what happens may depart from its family's; each is as likely beforehand.
@@ -31,16 +31,6 @@ const NAMELESS: f64 = 0.2;
 const COMPARED: usize = 12;
 /// What is told by name is likelier than not.
 pub(super) const LIKELY: f64 = 0.5;
-
-/// A name beside a part that has none.
-#[non_exhaustive]
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct LikelyName {
-    /// Name of a family.
-    pub effect: String,
-    /// Its probability, against all other names for what the same joints drive at the part's place, and none.
-    pub probability: f64,
-}
 
 /// Parts that belong together: at one place, driven by the same joints.
 #[derive(Clone, Debug, PartialEq, Eq)]

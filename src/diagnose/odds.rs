@@ -1,7 +1,8 @@
 //! How likely a name is among its hypotheses, and which of them are told with it, `docs/diagnosis-method.md` (64).
 
 use super::finding::Confusable;
-use super::search::{Hypothesis, Search, VISIBLE};
+use super::search::{Search, VISIBLE};
+use super::terms::Hypothesis;
 use crate::effects::{Family, Place};
 use crate::machine::Machine;
 

@@ -2,7 +2,8 @@
 
 use super::diagnosis::Diagnosis;
 use super::finding::{Confusable, Finding, Size};
-use super::search::{ModelTerm, Search};
+use super::search::Search;
+use super::terms::ModelTerm;
 
 /// Makes one finding of those that are orders of one error motion, where the first of them stands. Shares, held-out figures and curves
 /// are those of all its orders already.

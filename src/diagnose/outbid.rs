@@ -1,8 +1,9 @@
 //! Several names that one place without a name outbids: a patchwork, `docs/diagnosis-method.md` (77).
 
 use super::evidence::log_mean_exp;
-use super::search::{ModelTerm, Search};
+use super::search::Search;
 use super::series::Standing;
+use super::terms::ModelTerm;
 use super::whereabouts::standing;
 use crate::machine::Machine;
 

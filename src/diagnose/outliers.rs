@@ -2,36 +2,10 @@
 //!
 //! They are left out of everything that is judged, and told.
 
-use serde::{Deserialize, Serialize};
-
-use super::diagnosis::{Diagnosis, rms_of};
+use super::diagnosis::{Diagnosis, Outliers, WithoutOutliers};
+use super::rms::rms_of;
 use super::search::Search;
-use crate::units::{ByQuantity, Quantity, field_by_quantity};
-
-field_by_quantity!(largest);
-
-/// Samples of one recording that lie far off their surroundings whatever is taken away.
-#[non_exhaustive]
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Outliers {
-    /// File name.
-    pub recording: String,
-    /// Their lines in the file.
-    pub lines: Vec<u64>,
-    /// The largest departure.
-    #[serde(flatten, with = "largest")]
-    pub largest: ByQuantity<Option<f64>>,
-}
-
-/// RMS of all samples but outliers.
-#[non_exhaustive]
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct WithoutOutliers {
-    /// With constant deviations.
-    pub geometric: f64,
-    /// With what was found besides.
-    pub r#final: f64,
-}
+use crate::units::{ByQuantity, Quantity};
 
 /// A reading that was left out counts as an outlier beyond so many standard deviations of the noise, and of what is left of others.
 const FAR: f64 = 6.0;

@@ -5,44 +5,20 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::coarse::Coarse;
-use super::diagnosis::{Named, rms_of};
-use super::finding::HeldOutPair;
+use super::diagnosis::Named;
 use super::folds;
 use super::held_out::Model;
-use super::names::LikelyName;
+use super::nameless::UnnamedPart;
+use super::rms::rms_of;
 use super::score::Rows;
-use super::search::{ENTER, ModelTerm, Search, all_but};
+use super::search::{ENTER, Search};
 use super::shares::Shares;
+use super::terms::{ModelTerm, all_but};
 use crate::effects::{Candidate, Library, Place, RecordingFacts};
 use crate::feature::Dependence;
 use crate::machine::Machine;
-use crate::units::{ByQuantity, Quantity, field_by_quantity};
-
-field_by_quantity!(rms, held_out_rms);
-
-/// A part of what no family explains.
-#[non_exhaustive]
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct UnnamedPart {
-    /// Joint, frame or `measurement`.
-    pub at: String,
-    /// What it depends on: `position of c`, `direction of c`, `time`.
-    pub depends_on: Vec<String>,
-    /// What it makes of the readings beyond what geometry and all else would take of it.
-    #[serde(flatten, with = "rms")]
-    pub rms: ByQuantity<Option<f64>>,
-    /// RMS on stretches that were left out, the other parts taken in.
-    #[serde(flatten, with = "held_out_rms")]
-    pub held_out_rms: ByQuantity<Option<HeldOutPair>>,
-    /// Whether the model has it.
-    pub modelled: bool,
-    /// Names that come into question for what is at its place, the likeliest first.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub names: Vec<LikelyName>,
-}
+use crate::units::{ByQuantity, Quantity};
 
 /// More parts are not looked for.
 const MOST: usize = 16;

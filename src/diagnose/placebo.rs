@@ -2,8 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::score::{Score, best, judge, lengths};
-use super::search::{Hypothesis, ModelTerm, Search};
+use super::equations::{Score, best, judge, lengths};
+use super::search::Search;
+use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::{Candidate, Place};
 use crate::machine::Machine;
 

@@ -3,10 +3,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::enter::solved;
-use super::marginal::Marginal;
-use super::score::Score;
-use super::search::{Hypothesis, ModelTerm, Search};
+use super::equations::Score;
+use super::marginal::{Marginal, solved};
+use super::search::Search;
+use super::terms::{Hypothesis, ModelTerm};
 
 /// Times that all effects are looked at, where there are several; steps of each.
 const ROUNDS: usize = 2;

@@ -5,51 +5,23 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::finding::HeldOutPair;
 use super::folds;
 use super::held_out::Model;
-use super::names::LikelyName;
+use super::nameless::{LikelyName, Proposal};
 use super::parts::{TRIES, Unnamed, is_foretold};
-use super::search::{ENTER, ModelTerm, Search};
+use super::search::{ENTER, Search};
+use super::terms::ModelTerm;
 use crate::effects::{
     Candidate, Directions, Family, Library, LookAlike, Meaning, Output, Partner, Place, RecordingFacts, Seat,
     Size,
 };
 use crate::feature::Expression;
 use crate::machine::{JointKind, Machine};
-use crate::units::{ByQuantity, field_by_quantity};
-
-field_by_quantity!(held_out_rms, free_held_out_rms);
+use crate::units::ByQuantity;
 
 /// A law has no more terms.
 const MOST_TERMS: usize = 3;
-
-/// A family that is in no book yet.
-#[non_exhaustive]
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Proposal {
-    /// Name of the family.
-    pub name: String,
-    /// Joint where it was found.
-    pub at: String,
-    /// The other joint that it depends on.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub partner: Option<String>,
-    /// What it is a sum of, as formulas, each times a number of its own.
-    pub law: Vec<String>,
-    /// Whether it is the free function itself, because nothing shorter foretells as much.
-    pub free: bool,
-    /// RMS on stretches that were left out, without it and with it, all else taken in.
-    #[serde(flatten, with = "held_out_rms")]
-    pub held_out_rms: ByQuantity<Option<HeldOutPair>>,
-    /// The same without and with the free function.
-    #[serde(flatten, with = "free_held_out_rms")]
-    pub free_held_out_rms: ByQuantity<Option<HeldOutPair>>,
-    /// The family, as it stands in a file of effects.
-    pub ron: String,
-}
 
 /// Families for what the model has by free functions: at each place a law, or the functions as they are. `search`: with these functions;
 /// `known`: what has a name; `names`: those that come into question for a part.
@@ -106,12 +78,6 @@ pub(super) fn proposals(
         }
     }
     all
-}
-
-/// A file of effects with these families.
-pub(super) fn library_text(families: &str) -> String {
-    let heading = "// Proposed by kincal diagnose: in no book. Give them names, and hold them against other recordings by --effects.";
-    format!("{heading}\nEffects(families: [\n{families}])\n")
 }
 
 /// RMS of stretches left out, without and with these terms beside the others.

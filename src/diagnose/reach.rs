@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use super::discrepancy;
 use super::evidence::log_mean_exp;
 use super::score::Field;
-use super::search::{Hypothesis, LARGE, MANY, Search};
+use super::search::{LARGE, MANY, Search};
+use super::terms::Hypothesis;
 use crate::effects::Candidate;
 use crate::feature::Feature;
 

@@ -1,8 +1,9 @@
 //! Parameters between the points of the grid: a candidate may be much better there.
 
-use super::enter::solved;
-use super::score::{Field, Rows, Score};
-use super::search::Hypothesis;
+use super::equations::Score;
+use super::marginal::solved;
+use super::score::{Field, Rows};
+use super::terms::Hypothesis;
 use crate::effects::{Candidate, Parameter};
 
 /// Rounds over several parameters; parabolas at most, as long as they bring so much, or halvings of a step where nothing is smooth, for

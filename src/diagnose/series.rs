@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 use nalgebra::DMatrix;
 
 use super::coarse::Level;
-use super::score::{Column, Rows};
+use super::equations::Column;
+use super::score::Rows;
 use crate::effects::Place;
 use crate::lie::Twist;
 use crate::scalar::sines_cosines;

@@ -1,41 +1,14 @@
 //! Set-ups that took no part in the fit: whether what was found holds where the machine stands otherwise, `docs/diagnosis-method.md` (71).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
-use super::diagnosis::rms_of_rows;
+use super::diagnosis::{LeftOutRms, SetUpLeftOut};
 use super::marginal::gram;
 use super::placebo::Placebo;
-use super::search::{ModelTerm, Search};
-use crate::units::{ByQuantity, Quantity, field_by_quantity};
-
-field_by_quantity!(rms);
-
-/// What is left of one set-up when all others say what the machine is like.
-#[non_exhaustive]
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct SetUpLeftOut {
-    /// Its name.
-    pub setup: String,
-    /// How many samples it has.
-    pub samples: u64,
-    /// RMS of its samples.
-    #[serde(flatten, with = "rms")]
-    pub rms: ByQuantity<Option<LeftOutRms>>,
-}
-
-/// RMS of a set-up left out under three models.
-#[non_exhaustive]
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct LeftOutRms {
-    /// With constant deviations.
-    pub geometric: f64,
-    /// With what was found besides.
-    pub r#final: f64,
-    /// With as many numbers that multiply meaningless causes, where there is such a thing for an effect.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub placebo: Option<f64>,
-}
+use super::rms::rms_of_rows;
+use super::search::Search;
+use super::terms::ModelTerm;
+use crate::units::{ByQuantity, Quantity};
 
 /// Fewer samples of a set-up do not say where the machine stands.
 const FEWEST: usize = 6;

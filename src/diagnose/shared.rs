@@ -3,26 +3,13 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::diagnosis::Named;
 use super::held_out::Model;
-use super::search::{Hypothesis, ModelTerm, Search};
+use super::search::Search;
 use super::set_ups;
+use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Library;
 use crate::machine::Machine;
-
-/// A joint that has an effect of the findings too, so little that it is no finding; the model has it.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Companion {
-    /// Name of the effect.
-    pub effect: String,
-    /// Name of the place.
-    pub at: String,
-    /// Whether it comes anew with every set-up; else every joint has it more or less.
-    pub of_set_up: bool,
-}
 
 /// Effects that hardly ever come alone, at all other places where they are more likely than not, beside those that are kept; each time the
 /// one with the greatest evidence.

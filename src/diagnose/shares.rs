@@ -5,7 +5,8 @@ use nalgebra::DMatrix;
 use super::discrepancy;
 use super::leftover::Leftover;
 use super::marginal::Marginal;
-use super::search::{Hypothesis, ModelTerm, Search, side_by_side};
+use super::search::Search;
+use super::terms::{Hypothesis, ModelTerm, side_by_side};
 use crate::effects::Place;
 use crate::feature::Feature;
 

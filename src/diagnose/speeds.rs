@@ -1,6 +1,7 @@
 //! Whether speeds allow to tell what goes with velocity from what goes with direction.
 
-use super::search::{Hypothesis, ModelTerm, Search};
+use super::search::Search;
+use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Candidate;
 use crate::feature::Feature;
 

@@ -1,24 +1,7 @@
 //! When in the recordings something is there.
 
-use serde::{Deserialize, Serialize};
-
+use super::finding::Where;
 use super::search::Search;
-
-/// A stretch of a recording.
-#[non_exhaustive]
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Where {
-    /// File name.
-    pub recording: String,
-    /// Start, s; absent without time.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub from_s: Option<f64>,
-    /// End, s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub to_s: Option<f64>,
-    /// Part of what geometry leaves over.
-    pub share_of_misfit: f64,
-}
 
 /// In which recordings there is most of an energy of the rows, and when.
 pub(super) fn wheres(search: &Search, energy: &dyn Fn(usize) -> f64) -> Vec<Where> {

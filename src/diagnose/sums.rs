@@ -7,9 +7,10 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
 use super::course::Course;
+use super::equations::judge;
 use super::evidence::{Worth, evidence};
 use super::linear::Span;
-use super::score::{Field, Rows, judge};
+use super::score::{Field, Rows};
 use super::series::{Motion, Series, Standing};
 
 /// Waves over the range of each joint: the fewest, the most, and by how many they are apart.

@@ -1,76 +1,11 @@
 //! What no family explains: how large it is, where it fits best, and where it gathers.
 
-use serde::{Deserialize, Serialize};
-
-use super::parts::UnnamedPart;
+use super::finding::Where;
+use super::nameless::Gathering;
 use super::search::Search;
-use super::stretch::{Where, wheres};
+use super::stretch::wheres;
 use crate::machine::{JointKind, Machine};
 
-/// Structure that no family explains.
-#[non_exhaustive]
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Unexplained {
-    /// How large it is, m (rad where only angles are measured).
-    pub rms_m: f64,
-    /// The place that it fits best.
-    pub at: String,
-    /// Another joint whose position it goes with, where one does.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub goes_with: Option<String>,
-    /// Recordings and times of it.
-    pub r#where: Vec<Where>,
-    /// Stretches of travel in which it gathers, the most telling first; none where it is everywhere alike.
-    pub gathers: Vec<Gathering>,
-    /// Parts of it that are known by place and by what they depend on, the largest first; the model has those that foretell stretches left out.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub parts: Vec<UnnamedPart>,
-    /// In a sentence.
-    pub explanation: String,
-}
-
-impl Unexplained {
-    /// With its parts, each with the rank of its place, in any order. What a joint or frame foretells is not the instrument's: the place of
-    /// which most is there then says where it is.
-    pub(super) fn take(&mut self, mut parts: Vec<(Option<usize>, UnnamedPart)>) {
-        let size = |part: &UnnamedPart| part.rms.m.or(part.rms.rad).unwrap_or(0.0);
-        parts.sort_by(|(of_a, a), (of_b, b)| of_a.cmp(of_b).then(size(b).total_cmp(&size(a))));
-        let parts: Vec<UnnamedPart> = parts.into_iter().map(|(_, part)| part).collect();
-        if let Some(first) = parts.first().filter(|first| first.modelled && self.at == MEASUREMENT) {
-            self.explanation = self.explanation.replacen(
-                &format!("it fits best at {MEASUREMENT}"),
-                &format!("what is foretold of it is at {} for the most part", first.at),
-                1,
-            );
-            (self.at, self.goes_with) = (first.at.clone(), None);
-        }
-        self.parts = parts;
-    }
-}
-
-/// A stretch of a joint's travel that holds more of the misfit than of the samples.
-#[non_exhaustive]
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Gathering {
-    /// Name of the joint.
-    pub joint: String,
-    /// Where the stretch begins, m or rad.
-    pub from: f64,
-    /// Where it ends, m or rad.
-    pub to: f64,
-    /// `m` or `rad`.
-    pub unit: String,
-    /// Direction of travel, -1 or 1, where it is mostly one of them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub direction: Option<i8>,
-    /// Part of the misfit, 0 to 1.
-    pub share_of_misfit: f64,
-    /// Part of the samples, 0 to 1.
-    pub share_of_samples: f64,
-}
-
-/// The place that stands for the instrument.
-const MEASUREMENT: &str = "measurement";
 /// So many rows in a row tell how large the misfit is around them.
 const BLOCK: usize = 16;
 /// Parts of a joint's travel.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use super::discrepancy;
 use super::folds;
-use super::search::{ENTER, Hypothesis, ModelTerm, NEAR, Search, all_but};
+use super::search::{ENTER, Search};
+use super::steps::NEAR;
+use super::terms::{Hypothesis, ModelTerm, all_but};
 use crate::effects::Candidate;
 
 impl Search<'_> {

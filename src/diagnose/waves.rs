@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use super::equations::{Column, Key, key};
 use super::passing::{Passed, add_energies};
-use super::score::{Column, Field, Key, Rows, Wave, key};
+use super::score::{Field, Rows, Wave};
 use super::spectrum;
 use crate::effects::{Candidate, Coefficient};
 use crate::feature::Feature;

@@ -7,9 +7,9 @@ use rayon::prelude::*;
 
 use super::course::{Course, FINE};
 use super::curves::product;
+use super::equations::judge;
 use super::evidence::{Worth, evidence};
 use super::marginal::Marginal;
-use super::score::judge;
 use super::search::Search;
 use super::series::{Series, Standing, over_range, series, smooth};
 use super::sums::sums;

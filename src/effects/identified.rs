@@ -331,6 +331,7 @@ impl Identified<'_> {
 }
 
 /// An effect in a calibrated file, SI. It needs no library.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename = "effect", deny_unknown_fields)]
 pub struct StoredEffect {
@@ -358,6 +359,7 @@ pub struct StoredEffect {
 }
 
 /// A coefficient with what it multiplies.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename = "term", deny_unknown_fields)]
 pub struct StoredTerm {
@@ -374,6 +376,7 @@ pub struct StoredTerm {
 }
 
 /// Direction times feature in a slot.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename = "part", deny_unknown_fields)]
 pub struct StoredPart {
@@ -388,6 +391,7 @@ pub struct StoredPart {
 }
 
 /// A slot by the name of its frame.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum StoredSlot {
     /// Before the joint of this frame.

@@ -12,6 +12,7 @@ const MOST_PARAMETERS: usize = 4;
 const MOST_FEATURES: usize = 80;
 
 /// What is wrong with a family.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{what}")]
 pub struct LibraryFault {

@@ -132,6 +132,7 @@ impl ErrorModel {
 }
 
 /// From which side a joint came that never moves in a recording.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Approach {
     /// Index of the recording.
@@ -140,4 +141,11 @@ pub struct Approach {
     pub dyad: usize,
     /// 1 rising, -1 falling.
     pub direction: i8,
+}
+
+impl Approach {
+    /// The side from which the joint of this dyad came in this recording, both by index: 1 rising, -1 falling.
+    pub fn new(recording: usize, dyad: usize, direction: i8) -> Self {
+        Approach { recording, dyad, direction }
+    }
 }

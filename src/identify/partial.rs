@@ -26,8 +26,8 @@ const ROUND: &str = "kincal round 1";
 
 /// What some recordings add to an identification: what they say of themselves, and the sums of their samples in every round so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Part {
+#[serde(rename = "Part", deny_unknown_fields)]
+pub struct PartialEquations {
     kind: String,
     /// As RON: another machine's sums are refused.
     machine: String,
@@ -70,15 +70,15 @@ pub enum Merged {
     Another(Box<Round>),
 }
 
-impl Part {
+impl PartialEquations {
     /// What recordings say of themselves, before the first round; after that, their sums at the state that the round asks for.
     ///
     /// # Errors
     /// If a recording cannot be read; with a round, if it is of another machine, or of other recordings.
-    pub fn of(machine: &Machine, recordings: &[Recording], at: Option<&Round>) -> Result<Part> {
+    pub fn of(machine: &Machine, recordings: &[Recording], at: Option<&Round>) -> Result<PartialEquations> {
         let text = machine.to_ron();
         let Some(round) = at else {
-            return Ok(Part {
+            return Ok(PartialEquations {
                 kind: PART.into(),
                 machine: text,
                 rounds: 0,
@@ -123,15 +123,20 @@ impl Part {
         let rounds = own.first().map_or(0, |entry| entry.answers.len());
         let of = Some(own.len());
         own.retain(|entry| numbers.contains(&entry.number));
-        Ok(Part { kind: PART.into(), machine: text, rounds, of, recordings: own })
+        Ok(PartialEquations { kind: PART.into(), machine: text, rounds, of, recordings: own })
     }
 
-    /// Reads what [`Part::text`] has written.
+    /// Reads what [`PartialEquations::text`] has written.
     ///
     /// # Errors
     /// If the file cannot be read, or is none of these.
-    pub fn open(path: impl AsRef<Path>) -> Result<Part> {
-        read(path.as_ref(), PART, |part: &Part| &part.kind, "a part, as `kincal normal` writes it")
+    pub fn open(path: impl AsRef<Path>) -> Result<PartialEquations> {
+        read(
+            path.as_ref(),
+            PART,
+            |part: &PartialEquations| &part.kind,
+            "a part, as `kincal normal` writes it",
+        )
     }
 
     /// As a file holds it.
@@ -181,7 +186,7 @@ impl Round {
 ///
 /// # Errors
 /// As [`calibrate`](super::calibrate()); if parts are of several machines or rounds, or some are missing.
-pub fn merge(parts: &[Part], options: CalibrateOptions) -> Result<Merged> {
+pub fn merge(parts: &[PartialEquations], options: CalibrateOptions) -> Result<Merged> {
     let Some(first) = parts.first() else {
         return Err(refused("no part is given".into(), "name the files that `kincal normal` has written"));
     };

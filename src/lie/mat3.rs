@@ -30,6 +30,7 @@ impl<S: Scalar> Mat3<S> {
 
     /// The transposed matrix; for a rotation its inverse.
     #[inline(always)]
+    #[must_use]
     pub fn transpose(self) -> Self {
         let [[a, b, c], [d, e, f], [g, h, i]] = self.0;
         Mat3([[a, d, g], [b, e, h], [c, f, i]])
@@ -37,6 +38,7 @@ impl<S: Scalar> Mat3<S> {
 
     /// Every element times `factor`.
     #[inline(always)]
+    #[must_use]
     pub fn times(self, factor: S) -> Self {
         let [x, y, z] = self.0;
         Mat3([Vec3(x).times(factor).0, Vec3(y).times(factor).0, Vec3(z).times(factor).0])

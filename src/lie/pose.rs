@@ -111,6 +111,7 @@ impl<S: Scalar> Pose<S> {
 
     /// The inverse: `b_from_a` of `a_from_b`.
     #[inline(always)]
+    #[must_use]
     pub fn inverse(self) -> Self {
         let rotation = self.rotation.transpose();
         Pose { rotation, translation: -(rotation * self.translation) }

@@ -63,6 +63,7 @@ impl<S: Scalar> Twist<S> {
 
     /// Every component times `factor`.
     #[inline(always)]
+    #[must_use]
     pub fn times(self, factor: S) -> Self {
         Twist { v: self.v.times(factor), w: self.w.times(factor) }
     }
@@ -160,6 +161,7 @@ impl<S: Scalar> Adjoint<S> {
     }
 
     /// Product of two matrices of this form.
+    #[must_use]
     pub fn then_after(self, first: Self) -> Self {
         Adjoint {
             diagonal: self.diagonal * first.diagonal,

@@ -32,6 +32,7 @@ impl<S: Scalar> Vec3<S> {
 
     /// Vector product `self × other`.
     #[inline(always)]
+    #[must_use]
     pub fn cross(self, other: Self) -> Self {
         let ([a, b, c], [x, y, z]) = (self.0, other.0);
         Vec3([b.mul_add(z, -(c * y)), c.mul_add(x, -(a * z)), a.mul_add(y, -(b * x))])
@@ -39,6 +40,7 @@ impl<S: Scalar> Vec3<S> {
 
     /// Every component times `factor`.
     #[inline(always)]
+    #[must_use]
     pub fn times(self, factor: S) -> Self {
         let [x, y, z] = self.0;
         Vec3([x * factor, y * factor, z * factor])

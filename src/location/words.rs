@@ -6,6 +6,7 @@ use super::{LocationError, LocationErrors};
 const CLEAR: f64 = 2.0;
 
 /// What an identified location error means, and what can be done about it.
+#[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Said {
     /// Name of the error after ISO 230-1.

@@ -2,7 +2,7 @@
 
 use super::change::Change;
 use super::list::targets;
-use super::nonsense::{Apart, Mistake, Nonsense};
+use super::nonsense::{Apart, LikelyMistake, Nonsense};
 use super::thinned::Thinned;
 use super::undone::without;
 use crate::error::Result;
@@ -49,7 +49,7 @@ pub(super) fn search(
             let Some(then) = left(&without(machine, &thinned, &[change])?, worst, true) else { continue };
             if then <= ALIKE * alone {
                 let (what, mend) = (change.in_words(machine), change.mend(machine));
-                mistakes.push(Mistake { what, mend, left: then });
+                mistakes.push(LikelyMistake { what, mend, left: then });
                 break;
             }
         }

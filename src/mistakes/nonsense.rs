@@ -14,7 +14,7 @@ pub struct Nonsense {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub apart: Option<Apart>,
     /// The mistakes that would explain it, best first; several where the recordings do not tell them apart.
-    pub mistakes: Vec<Mistake>,
+    pub mistakes: Vec<LikelyMistake>,
     /// How many were tried, and what.
     pub tried: usize,
     /// The kinds that were tried.
@@ -24,7 +24,7 @@ pub struct Nonsense {
 /// A mistake that would explain recordings.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Mistake {
+pub struct LikelyMistake {
     /// Which, as the part of a sentence that follows "with".
     pub what: String,
     /// What to do about it.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::apart;
 use super::change::Change;
 use super::list::{TRIED, changes};
-use super::nonsense::{Mistake, Nonsense};
+use super::nonsense::{LikelyMistake, Nonsense};
 use super::others::{Other, others};
 use super::thinned::Thinned;
 use super::undone::without;
@@ -119,7 +119,7 @@ impl Trial<'_> {
 
     /// Adds machines in place of the given one that explain the recordings as well as the best mistakes; such as explain them far better
     /// stand alone. How many there are.
-    fn in_place_of_it(&self, scored: &Scored, mistakes: &mut Vec<Mistake>) -> Result<usize> {
+    fn in_place_of_it(&self, scored: &Scored, mistakes: &mut Vec<LikelyMistake>) -> Result<usize> {
         let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
         let others = others(self.machine);
         let excess = |other: &Other| {
@@ -146,14 +146,18 @@ impl Trial<'_> {
                 (&p.recording, p.of_angles) == (&self.left.recording, self.left.of_angles)
             };
             if let Some(own) = fit.plausibility.iter().find(same) {
-                mistakes.push(Mistake { what: other.what.clone(), mend: other.mend.clone(), left: own.left });
+                mistakes.push(LikelyMistake {
+                    what: other.what.clone(),
+                    mend: other.mend.clone(),
+                    left: own.left,
+                });
             }
         }
         Ok(others.len())
     }
 
     /// Those that explain the recordings and cannot be told apart, calibrated without them.
-    fn named(&self, scored: &Scored) -> Result<Vec<Mistake>> {
+    fn named(&self, scored: &Scored) -> Result<Vec<LikelyMistake>> {
         let least = scored.first().map_or(f64::INFINITY, |(excess, _)| *excess);
         let mut alike: Vec<_> = scored.iter().take_while(|(excess, _)| *excess <= ALIKE * least).collect();
         // What leaves more of the target open explains no less.
@@ -175,7 +179,7 @@ impl Trial<'_> {
                 let words = |word: fn(&Change, &Machine) -> String| -> Vec<String> {
                     mistakes.iter().map(|change| word(change, self.machine)).collect()
                 };
-                named.push(Mistake {
+                named.push(LikelyMistake {
                     what: words(Change::in_words).join(" and "),
                     mend: words(Change::mend).join(", and "),
                     left: own.left,

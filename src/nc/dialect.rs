@@ -1,6 +1,7 @@
 //! Families of controls, as far as the same text means different things to them.
 
 /// A family of controls. Most of the language is common; a dialect decides only where the same text has two meanings.
+#[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Dialect {
     /// RS-274 and its relatives: LinuxCNC, Fanuc, Haas, Mitsubishi, grbl.

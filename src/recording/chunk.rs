@@ -38,6 +38,7 @@ impl Chunk {
     }
 
     /// These samples alone, by their index; the count of dropped rows is left behind.
+    #[must_use]
     pub fn chosen(&self, samples: &[usize]) -> Chunk {
         let rows = |all: &[f64]| -> Vec<f64> {
             let width = all.len() / self.len.max(1);

@@ -16,6 +16,7 @@ use form::{BacklashForm, FaultsForm, Triple, WidthForm};
 const GUIDE: &str = "docs/simulate.md shows the form of a faults file";
 
 /// Faults of one machine, m and rad.
+#[non_exhaustive]
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Faults {
     /// Deviations `dh` of initial poses: index of the dyad, twist in its own frame, `M exp(dh)`, `docs/model.md` (10).

@@ -131,6 +131,7 @@ impl Plant {
     }
 
     /// Deviations of every dyad drawn from the machine's tolerances times `size`, added to those that are there.
+    #[must_use]
     pub fn with_random(mut self, size: f64, seed: u64) -> Self {
         let random = random_deviations(&self.machine, size, seed);
         self.constant.iter_mut().zip(random).for_each(|(dh, more)| *dh = *dh + more);
@@ -144,6 +145,7 @@ impl Plant {
     /// ```
     ///
     /// and what stands behind the joint goes into the next dyad.
+    #[must_use]
     pub fn with_faults(mut self, faults: &Faults) -> Self {
         for (j, dh) in &faults.deviations {
             self.constant[*j] = self.constant[*j] + *dh;
@@ -192,6 +194,7 @@ impl Plant {
     }
 
     /// Adds a deviation of dyad `j` that depends on the displacements of all dyads' joints (m or rad, machine order).
+    #[must_use]
     pub fn with_varying(
         mut self,
         j: usize,
@@ -202,6 +205,7 @@ impl Plant {
     }
 
     /// Stands the instrument's frame `w` elsewhere: its pose in the frame `w` of the machine.
+    #[must_use]
     pub fn with_instrument_frame(mut self, w_from_instrument: Pose<f64>) -> Self {
         self.w_from_instrument = Some(w_from_instrument);
         self

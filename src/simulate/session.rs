@@ -44,6 +44,7 @@ impl<'a> Session<'a> {
     }
 
     /// The same with a clock that begins so many seconds later.
+    #[must_use]
     pub fn beginning_at(mut self, seconds: f64) -> Self {
         self.later = seconds;
         self

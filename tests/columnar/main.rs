@@ -71,7 +71,7 @@ fn tables_of_other_programs_are_the_recording_that_their_csv_is() {
         let text = found.recordings[0].text.as_bytes();
         Recording::from_bytes("rec.csv", text, &scara).expect("a recording")
     };
-    let one = Request { rows: [("run".to_string(), "one".to_string())].into(), ..Request::default() };
+    let one = Request::default().with_rows("run", "one");
     let table = project("tests/columnar/table.csv");
     let tables: Vec<PathBuf> =
         files("tests/columnar").into_iter().filter(|p| !p.ends_with("recording.parquet")).collect();

@@ -1,11 +1,10 @@
 //! The path and the preset errors of the paper, as its tables print them.
 
+use super::random::Random;
 use kincal::lie::{Twist, Vec3};
 use kincal::machine::JointKind;
 use kincal::simulate::{Balls, Faults, Figure, Pace, Plant, Rounding, Sense, Turning, Turns, Width, rest};
 use kincal::{CalibratedMachine, Machine, Result};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 /// The executed path of the paper (tables 7 and 9) with a bar of `length` (m): the cone without tool centre point function, both
 /// rotary axes against the sense that aims the tool, a stop after each half turn, to 360° and back, a position every `step` (rad;
@@ -42,8 +41,8 @@ pub fn paper_path(machine: &Machine, length: f64, step: f64) -> Result<Turning> 
 /// 0.4 cos q) urad on the first rotary axis and 40 urad on the second, 20 urad of the first that gravity turns it by (as the sine of
 /// its angle), and 2.5 um at the tool that no model has (harmonics of both angles with random phases).
 pub fn paper_plant(machine: &Machine, seed: u64) -> Plant {
-    let mut rng = StdRng::seed_from_u64(seed);
-    let mut random = |size: [f64; 6]| Twist::from_array(size.map(|s| s * normal(&mut rng)));
+    let mut rng = Random::new(seed);
+    let mut random = |size: [f64; 6]| Twist::from_array(size.map(|s| s * rng.normal()));
     let (um, urad) = (1e-6, 1e-6);
     let size = [50.0 * um, 50.0 * um, 50.0 * um, 100.0 * urad, 100.0 * urad, 100.0 * urad];
     let deviations = (0..machine.dyads().len()).map(|j| (j, random(size))).collect();
@@ -59,7 +58,8 @@ pub fn paper_plant(machine: &Machine, seed: u64) -> Plant {
         period: std::f64::consts::TAU,
     };
     let backlash = rotary.iter().map(|(j, _)| *j).zip([by_angle, Width::Constant(40.0 * urad)]).collect();
-    let faults = Faults { deviations, backlash, ..Faults::default() };
+    let mut faults = Faults::default();
+    (faults.deviations, faults.backlash) = (deviations, backlash);
     let phases = random([std::f64::consts::PI; 6]).to_array();
     let mut plant = Plant::new(&CalibratedMachine::nominal(machine.clone())).with_faults(&faults);
     if let Some((j, xi)) = rotary.first().copied() {
@@ -77,11 +77,4 @@ pub fn paper_plant(machine: &Machine, seed: u64) -> Plant {
 fn rotary_commands(machine: &Machine) -> Vec<usize> {
     let commands = 0..machine.commands().len();
     commands.filter(|c| machine.command_joint(*c).kind == JointKind::Revolute).collect()
-}
-
-/// A standard normal number (Box and Muller).
-fn normal(rng: &mut StdRng) -> f64 {
-    let u: f64 = rng.random_range(f64::MIN_POSITIVE..1.0);
-    let v: f64 = rng.random_range(0.0..std::f64::consts::TAU);
-    (-2.0 * u.ln()).sqrt() * v.cos()
 }

@@ -1,4 +1,5 @@
-//! The random numbers of all tests. Only the blind harness draws by itself: its cases share no code with anything.
+//! The random numbers of all tests. Two harnesses that are examples too draw by themselves: the blind one, whose cases share no code with
+//! anything, and that of damaged texts, which draws integers.
 
 use std::f64::consts::TAU;
 

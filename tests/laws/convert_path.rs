@@ -77,7 +77,11 @@ fn ballbar(d: &[f64], before: usize, behind: usize, seed: u64) -> String {
 }
 
 fn converted(table: &str, machine: &Machine, path: Nominal, rate: Option<f64>) -> kincal::Result<Converted> {
-    let request = Request { path: Some(path), sample_rate: rate, ..Request::default() };
+    let request = Request::default().with_path(path);
+    let request = match rate {
+        Some(rate) => request.with_sample_rate(rate),
+        None => request,
+    };
     read("ballbar.txt", table.as_bytes(), Some(machine), &request)
 }
 

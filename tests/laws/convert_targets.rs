@@ -71,8 +71,7 @@ fn a_reading_a_row() -> String {
 }
 
 fn of_x() -> Request {
-    let head = vec!["fixed y[mm]: 0".to_string(), "fixed z[mm]: 0".to_string()];
-    Request { head, joint: Some("x".into()), ..Request::default() }
+    Request::default().with_head("fixed y[mm]: 0").with_head("fixed z[mm]: 0").with_joint("x")
 }
 
 fn converted(text: &str, machine: &Machine, request: &Request) -> Converted {
@@ -82,8 +81,7 @@ fn converted(text: &str, machine: &Machine, request: &Request) -> Converted {
 #[test]
 fn three_forms_of_one_table_are_one_recording() {
     let mill = machine("xyz_mill");
-    let told =
-        Request { units: vec![("target".into(), "mm".into()), ("deviation".into(), "um".into())], ..of_x() };
+    let told = of_x().with_unit("target", "mm").with_unit("deviation", "um");
     let wide = converted(&a_target_a_row(), &mill, &of_x());
     let across = converted(&a_run_a_row(), &mill, &told);
     let long = converted(&a_reading_a_row(), &mill, &of_x());
@@ -109,7 +107,10 @@ fn three_forms_of_one_table_are_one_recording() {
 fn figures_are_those_of_their_definitions() {
     let found =
         converted(&a_target_a_row(), &machine("xyz_mill"), &of_x()).positioning.expect("a table of targets");
-    assert_eq!((found.targets, found.runs, found.unit, found.joint.as_str()), (11, [5, 5], "m", "x"));
+    assert_eq!(
+        (found.targets, found.runs, found.unit.as_str(), found.joint.as_str()),
+        (11, [5, 5], "m", "x")
+    );
     let of = |i: usize, way: bool| -> Vec<f64> {
         (0..5).map(|j| (deviation(i, j, way) * 1e4).round() * 1e-10).collect()
     };
@@ -162,7 +163,7 @@ fn what_a_table_of_targets_does_not_say_is_asked() {
         refused(plain, &of_x())
             .contains("from which side the targets of 2 runs were approached\n  = --approach")
     );
-    let alternating = Request { approach: Some("alternating".into()), ..of_x() };
+    let alternating = of_x().with_approach("alternating");
     let text = &converted(plain, &mill, &alternating).recordings[0].text;
     assert!(text.ends_with("20.0,1,20.002\n20.0,-1,20.004\n10.0,-1,10.003\n0.0,-1,0.002\n"), "{text}");
     // mm in place of um.
@@ -179,7 +180,7 @@ fn what_a_table_of_targets_does_not_say_is_asked() {
     let found = read("c.csv", rotary.as_bytes(), Some(&machine("rotary_axis")), &Request::default())
         .expect("one axis");
     let positioning = found.positioning.expect("figures");
-    assert_eq!((positioning.unit, positioning.runs), ("rad", [1, 1]));
+    assert_eq!((positioning.unit.as_str(), positioning.runs), ("rad", [1, 1]));
     let both = positioning.both.expect("both senses");
     assert!((both.reversal - (4.0f64 / 3600.0).to_radians()).abs() < 1e-15 && both.accuracy.is_none());
 }
@@ -222,12 +223,10 @@ fn an_r_test_says_where_the_tool_stood() {
         table += &format!("{a},{c},{:.7},{:.7},{:.7}\n", e.0[0] * 1e6, e.0[1] * 1e6, e.0[2] * 1e6);
         truth.push((q, p));
     }
-    let request = Request {
-        measurement: Some("r-test".into()),
-        deviation: Some("ball-minus-tool".into()),
-        head: vec!["workpiece_point[mm]: 120, 20, 50".into()],
-        ..Request::default()
-    };
+    let request = Request::default()
+        .with_measurement("r-test")
+        .with_deviation("ball-minus-tool")
+        .with_head("workpiece_point[mm]: 120, 20, 50");
     let found = converted(&table, &machine, &request);
     let text = &found.recordings[0].text;
     let recording =
@@ -247,9 +246,9 @@ fn an_r_test_says_where_the_tool_stood() {
     let rms = fit.rms.m.expect("positions");
     assert!(rms.geometric < 1e-7 && rms.nominal > 1e-5, "{rms:?}");
     // The other sense, and what has to be told.
-    let other = Request { deviation: Some("tool-minus-ball".into()), ..request.clone() };
+    let other = request.clone().with_deviation("tool-minus-ball");
     assert_ne!(&converted(&table, &machine, &other).recordings[0].text, text);
-    let asked = Request { head: Vec::new(), deviation: None, ..request.clone() };
+    let asked = Request::default().with_measurement("r-test");
     let error = read("r.csv", table.as_bytes(), Some(&machine), &asked).expect_err("not told");
     let said = error.to_string();
     for what in [
@@ -278,11 +277,7 @@ fn capture(rate: &str, interval: &str, readings: &[f64]) -> Vec<u8> {
 fn a_dynamic_capture_is_time_and_readings() {
     let axis = machine("linear_axis");
     let name = axis.commands()[0].clone();
-    let request = Request {
-        units: vec![("length".into(), "mm".into())],
-        head: vec![format!("fixed {name}[mm]: 0")],
-        ..Request::default()
-    };
+    let request = Request::default().with_unit("length", "mm").with_head(format!("fixed {name}[mm]: 0"));
     let readings = [0.0, 0.0010, -0.5, 1e-9];
     for (rate, interval) in [("50000", "2e-5"), ("50", "2e-5"), ("50 kHz", "?"), ("50000 Hz", "")] {
         let found = read("x.rtx", &capture(rate, interval, &readings), Some(&axis), &request)
@@ -325,14 +320,11 @@ fn gaps_in_tables_of_deviations_are_told() {
     let wide = "Target [mm];1+ [um];1- [um];2+ [um];2- [um]\n0;-1,2;8,1;-1,0;8,4\n100;0,3;9,9;0,1;9,7\n200;1,8;11,2;2,1;11,0\n";
     let across = "Run,0,100,200\n1 up,1,2,3\n1 down,4,5,6\n";
     let r_test = "A [deg],C [deg],dX [um],dY [um],dZ [um]\n0,0,1,2,3\n10,90,2,-,4\n";
-    let units = vec![("target".into(), "mm".into()), ("deviation".into(), "um".into())];
-    let told = Request { units, ..of_x() };
-    let ball = Request {
-        measurement: Some("r-test".into()),
-        deviation: Some("ball-minus-tool".into()),
-        head: vec!["workpiece_point[mm]: 120, 20, 50".into()],
-        ..Request::default()
-    };
+    let told = of_x().with_unit("target", "mm").with_unit("deviation", "um");
+    let ball = Request::default()
+        .with_measurement("r-test")
+        .with_deviation("ball-minus-tool")
+        .with_head("workpiece_point[mm]: 120, 20, 50");
     for (table, machine, request) in [(wide, &mill, &of_x()), (across, &mill, &told), (r_test, &five, &ball)]
     {
         assert!(read("t.csv", table.as_bytes(), Some(machine), request).is_ok(), "{table}");

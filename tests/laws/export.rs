@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::common::random::Random;
 use kincal::export::{BaseFile, ExportOptions, Format, export};
 use kincal::import::{Ends, read};
 use kincal::lie::{Pose, Twist};
 use kincal::{CalibratedMachine, Chain, Machine};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
@@ -15,7 +14,7 @@ fn folder(name: &str) -> PathBuf {
 
 /// Every machine that comes with the program, with deviations of some tenths of a millimetre and a milliradian.
 fn machines() -> Vec<CalibratedMachine> {
-    let mut rng = StdRng::seed_from_u64(7);
+    let mut rng = Random::new(7);
     let mut names: Vec<PathBuf> = std::fs::read_dir(folder("machines"))
         .expect("a folder")
         .map(|e| e.expect("readable").path())
@@ -29,12 +28,12 @@ fn machines() -> Vec<CalibratedMachine> {
     names.into_iter().map(calibrated).collect()
 }
 
-fn deviations(count: usize, rng: &mut StdRng) -> Vec<Twist<f64>> {
-    (0..count).map(|_| Twist::from_array(std::array::from_fn(|_| rng.random_range(-1e-3..1e-3)))).collect()
+fn deviations(count: usize, rng: &mut Random) -> Vec<Twist<f64>> {
+    (0..count).map(|_| Twist::from_array(std::array::from_fn(|_| rng.between(-1e-3, 1e-3)))).collect()
 }
 
-fn commands(machine: &Machine, rng: &mut StdRng) -> Vec<f64> {
-    machine.commands().iter().map(|_| rng.random_range(-2.0..2.0)).collect()
+fn commands(machine: &Machine, rng: &mut Random) -> Vec<f64> {
+    machine.commands().iter().map(|_| rng.between(-2.0, 2.0)).collect()
 }
 
 /// Largest difference of two poses, m and of rotation matrices.
@@ -45,7 +44,7 @@ fn gap(a: Pose<f64>, b: Pose<f64>) -> f64 {
 
 #[test]
 fn a_urdf_file_read_back_is_the_same_machine() {
-    let mut rng = StdRng::seed_from_u64(3);
+    let mut rng = Random::new(3);
     let mut compared = 0;
     for calibrated in machines() {
         let machine = calibrated.machine();
@@ -57,7 +56,7 @@ fn a_urdf_file_read_back_is_the_same_machine() {
             );
             continue;
         };
-        let ends = Ends { base: Some("w".into()), tip: Some("t".into()) };
+        let ends = Ends::default().with_base("w").with_tip("t");
         let back = read("back.urdf", &exported.text, &ends).expect("sound").machine;
         assert_eq!(back.commands(), machine.commands());
         for _ in 0..20 {
@@ -73,9 +72,9 @@ fn a_urdf_file_read_back_is_the_same_machine() {
 #[test]
 fn a_base_file_keeps_every_byte_but_its_origins() {
     let path = folder("tests/urdf/arm.urdf");
-    let ends = Ends { base: None, tip: Some("finger".into()) };
+    let ends = Ends::default().with_tip("finger");
     let text = std::fs::read_to_string(&path).expect("a text");
-    let mut rng = StdRng::seed_from_u64(5);
+    let mut rng = Random::new(5);
     let mut before = String::new();
     // As it stands; with what stands before the first element, a prefix that nobody declares, and origins that are not there.
     for round in 0..3 {
@@ -93,7 +92,7 @@ fn a_base_file_keeps_every_byte_but_its_origins() {
         let deviations = deviations(machine.dyads().len(), &mut rng);
         let calibrated = CalibratedMachine::nominal(machine.clone()).with_deviations(deviations);
         let mut options = ExportOptions::default();
-        options.base_file = Some(BaseFile { file: path.clone(), text: text.clone(), ends: ends.clone() });
+        options.base_file = Some(BaseFile::new(path.clone(), text.clone(), ends.clone()));
         let exported = export(&calibrated, Format::Urdf, &options).expect("sound");
         let back = read(&path, &exported.text, &ends).expect("sound").machine;
         for _ in 0..20 {
@@ -128,7 +127,7 @@ fn placed(text: &str, head: &str) -> Pose<f64> {
 
 #[test]
 fn a_chain_rebuilt_from_its_dh_table_is_the_same_machine() {
-    let mut rng = StdRng::seed_from_u64(11);
+    let mut rng = Random::new(11);
     let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(kincal::lie::Vec3);
     let mut second_turns = 0;
     for calibrated in machines() {
@@ -165,7 +164,7 @@ fn a_chain_rebuilt_from_its_dh_table_is_the_same_machine() {
 
 #[test]
 fn a_dh_table_read_back_is_the_same_machine() {
-    let mut rng = StdRng::seed_from_u64(13);
+    let mut rng = Random::new(13);
     for calibrated in machines() {
         let machine = calibrated.machine();
         for format in [Format::Dh, Format::Mdh] {
@@ -200,11 +199,11 @@ fn displaced(machine: &Machine, back: &Machine, q: &[f64]) -> Vec<f64> {
 
 #[test]
 fn a_model_of_mujoco_read_back_is_the_same_machine() {
-    let mut rng = StdRng::seed_from_u64(17);
+    let mut rng = Random::new(17);
     for calibrated in machines() {
         let machine = calibrated.machine();
         let exported = export(&calibrated, Format::Mjcf, &ExportOptions::default()).expect("a model");
-        let ends = Ends { base: Some("w".into()), tip: Some("t".into()) };
+        let ends = Ends::default().with_base("w").with_tip("t");
         let back = read("back.xml", &exported.text, &ends).expect("sound").machine;
         assert_eq!(back.commands().len(), machine.joints().count(), "{}", machine.name());
         for _ in 0..20 {
@@ -317,14 +316,14 @@ fn what_cannot_be_exported_is_told_with_its_mend() {
         text.lines().filter(|line| !line.contains(play)).flat_map(|line| [line, "\n"]).collect();
     refuse(&CalibratedMachine::parse("lift.ron", &text).expect("sound"), Format::EncComp, &none);
     // Base files that are not the machine's.
-    let ends = Ends { base: None, tip: Some("finger".into()) };
+    let ends = Ends::default().with_tip("finger");
     let text = std::fs::read_to_string(folder("tests/urdf/arm.urdf")).expect("a text");
     let machine = read("arm.urdf", &text, &ends).expect("sound").machine;
     let arm = CalibratedMachine::nominal(machine);
     let based = |text: String, tip: &str| {
         let mut options = ExportOptions::default();
-        let ends = Ends { base: None, tip: Some(tip.into()) };
-        options.base_file = Some(BaseFile { file: "robot.urdf".into(), text, ends });
+        let ends = Ends::default().with_tip(tip);
+        options.base_file = Some(BaseFile::new("robot.urdf", text, ends));
         options
     };
     refuse(&arm, Format::Urdf, &based(text.clone(), "lower"));
@@ -333,7 +332,7 @@ fn what_cannot_be_exported_is_told_with_its_mend() {
     refuse(&arm, Format::Urdf, &based(text.replace("</robot>", ""), "finger"));
     let entity = text.replace("\"0.3 0 0.05\"", "\"&o;\"");
     let entity = entity.replace("<robot", "<!DOCTYPE robot [<!ENTITY o \"0.3 0 0.05\">]>\n<robot");
-    let mut moved = StdRng::seed_from_u64(1);
+    let mut moved = Random::new(1);
     let deviations = deviations(arm.machine().dyads().len(), &mut moved);
     let arm = arm.with_deviations(deviations);
     let options = based(entity.clone(), "finger");

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
+use crate::common::random::Random;
 use kincal::export::{ExportOptions, Exported, Format, export};
 use kincal::import::{Beside, ImportOptions, read_with};
 use kincal::lie::{Pose, Twist, Vec3};
 use kincal::{CalibratedMachine, Chain, Machine};
-use rand::rngs::StdRng;
-use rand::{RngExt, SeedableRng};
 
 const TOOL: f64 = 0.0931037;
 
@@ -135,14 +134,14 @@ fn apart(
     let machine = calibrated.machine();
     let at = |name: &str| machine.commands().iter().position(|c| c == name).expect("a command");
     let chain = calibrated.chain();
-    let mut rng = StdRng::seed_from_u64(2);
+    let mut rng = Random::new(2);
     let home = vec![0.0; machine.commands().len()];
     // Where the tip is at home the program's zero is put, and its axes along the machine's: what an operator does with a part.
     let w_from_world = chain.w_from_t(&home);
     let zero = world([0.0, 0.0, 0.0], [0.0; 2]);
     let mut largest: f64 = 0.0;
     for _ in 0..200 {
-        let q: Vec<f64> = machine.commands().iter().map(|_| rng.random_range(-1.5..1.5)).collect();
+        let q: Vec<f64> = machine.commands().iter().map(|_| rng.between(-1.5, 1.5)).collect();
         let linear = ["x", "y", "z"].map(|name| 1e3 * q[at(name)]);
         let angles = rotary.map(|(name, sense)| sense * q[at(name)].to_degrees());
         let w = minus(world(linear, angles), zero).map(|x| 1e-3 * x);
@@ -159,7 +158,7 @@ fn reimported(out: &Exported) -> Machine {
     let mut options = ImportOptions::default();
     options.tool_length = TOOL;
     options.hal = vec!["machine.hal".into()];
-    options.beside = vec![Beside { file: "machine.hal".into(), text: out.text.clone() }];
+    options.beside = vec![Beside::new("machine.hal", out.text.clone())];
     read_with("machine.ini", &ini, &options).expect("sound").machine
 }
 
@@ -301,10 +300,10 @@ fn siemens_with_our_vectors_has_the_tool_tip_of_the_model() {
     assert!((i2 + i3 + i4).norm() < 1e-12);
     let chain = calibrated.chain();
     let home = chain.w_from_t(&[0.0; 5]);
-    let mut rng = StdRng::seed_from_u64(8);
+    let mut rng = Random::new(8);
     let names = calibrated.machine().commands().to_vec();
     for _ in 0..100 {
-        let q: Vec<f64> = names.iter().map(|_| rng.random_range(-1.5..1.5)).collect();
+        let q: Vec<f64> = names.iter().map(|_| rng.between(-1.5, 1.5)).collect();
         let of = |name: &str| q[names.iter().position(|n| n == name).expect("a command")];
         // The table carries the part: it turns by A about V1 through I2, and by C about V2 through I2 + I3.
         let tip = Vec3([of("x"), of("y"), of("z") - TOOL]);

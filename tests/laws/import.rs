@@ -23,7 +23,7 @@ fn about(axis: [f64; 3], angle: f64) -> Isometry3<f64> {
 
 #[test]
 fn an_imported_arm_stands_where_its_urdf_says() {
-    let arm = open(arm(), &Ends { base: None, tip: Some("finger".into()) }).expect("a sound file");
+    let arm = open(arm(), &Ends::default().with_tip("finger")).expect("a sound file");
     assert_eq!(arm.machine.commands(), ["lift_1", "shoulder", "elbow"]);
     for [lift, shoulder, elbow] in [[0.0; 3], [0.3, -1.2, 0.7], [-0.1, 3.0, -2.0]] {
         let expected = origin([0.1, -0.2, 0.3], [0.3, -0.4, 1.5312])
@@ -49,8 +49,8 @@ fn an_imported_arm_stands_where_its_urdf_says() {
 
 #[test]
 fn a_chain_between_two_ends_is_the_one_from_the_root_seen_from_the_other() {
-    let whole = |tip: &str| open(arm(), &Ends { base: None, tip: Some(tip.into()) }).expect("sound").machine;
-    let ends = Ends { base: Some("weight".into()), tip: Some("finger".into()) };
+    let whole = |tip: &str| open(arm(), &Ends::default().with_tip(tip)).expect("sound").machine;
+    let ends = Ends::default().with_base("weight").with_tip("finger");
     let between = open(arm(), &ends).expect("sound").machine;
     let b_from_weight = Chain::nominal(&whole("weight")).w_from_t(&[0.2]);
     let b_from_finger = Chain::nominal(&whole("finger")).w_from_t(&[0.2, 0.4, -0.3]);
@@ -63,7 +63,7 @@ fn a_chain_between_two_ends_is_the_one_from_the_root_seen_from_the_other() {
 
 #[test]
 fn masses_that_are_bolted_together_weigh_as_one() {
-    let arm = open(arm(), &Ends { base: None, tip: Some("finger".into()) }).expect("a sound file");
+    let arm = open(arm(), &Ends::default().with_tip("finger")).expect("a sound file");
     let lift = arm.machine.frame_index("lift_1").expect("a frame");
     let mass = arm.machine.dyads()[lift].mass.expect("a mass");
     assert_eq!(mass.mass, 4.0);
@@ -74,7 +74,7 @@ fn masses_that_are_bolted_together_weigh_as_one() {
 
 #[test]
 fn the_file_of_an_imported_machine() {
-    let arm = open(arm(), &Ends { base: None, tip: Some("finger".into()) }).expect("a sound file");
+    let arm = open(arm(), &Ends::default().with_tip("finger")).expect("a sound file");
     insta::assert_snapshot!(arm.text);
 }
 
@@ -83,7 +83,7 @@ fn a_prefix_that_nobody_declares_is_no_fault() {
     let text = std::fs::read_to_string(arm())
         .expect("a file")
         .replace("<link name=\"floor\"/>", "<link name=\"floor\"><sensor:camera a:b=\"1\"/></link>");
-    let ends = Ends { base: None, tip: Some("finger".into()) };
+    let ends = Ends::default().with_tip("finger");
     assert_eq!(
         read("arm.urdf", &text, &ends).expect("sound").machine,
         open(arm(), &ends).expect("sound").machine
@@ -112,7 +112,7 @@ fn what_cannot_be_imported_is_told_with_its_place_and_mend() {
 #[test]
 fn no_beginning_of_a_file_and_no_gap_in_it_makes_the_reader_panic() {
     let text = std::fs::read_to_string(arm()).expect("a file");
-    let ends = Ends { base: None, tip: Some("finger".into()) };
+    let ends = Ends::default().with_tip("finger");
     let mut refused = 0;
     for at in 0..text.len() {
         refused += usize::from(read("arm.urdf", &text[..at], &ends).is_err());

@@ -70,7 +70,7 @@ fn a_table_is_of_the_convention_that_it_states() {
         "{error}"
     );
     let mut options = as_dh();
-    options.ends = Ends { base: None, tip: Some("q6".into()) };
+    options.ends = Ends::default().with_tip("q6");
     let error = open_with(table("puma560.csv"), &options).expect_err("no links");
     assert!(error.mend().contains("# tool[m,rad]"), "{}", error.mend());
 }

@@ -266,7 +266,7 @@ fn with(module: &str, pins: &[(&str, f64)]) -> kincal::Result<Imported> {
     );
     let hal: String = pins.iter().map(|(pin, value)| format!("setp {module}.{pin} {value:?}\n")).collect();
     let mut options = ImportOptions::default();
-    options.beside = vec![Beside { file: "m.hal".into(), text: hal }];
+    options.beside = vec![Beside::new("m.hal", hal)];
     read_with("test.ini", &text, &options)
 }
 
@@ -351,7 +351,7 @@ fn pins_that_are_not_known_are_told_with_their_mend() {
     let mut refuse = |hal: &str, options: &mut ImportOptions| {
         let text = "[KINS]\nKINEMATICS = 5axiskins\n[TRAJ]\nLINEAR_UNITS = mm\n[PIVOT]\nL = long\n";
         options.hal = vec!["m.hal".into()];
-        options.beside = vec![Beside { file: "m.hal".into(), text: hal.into() }];
+        options.beside = vec![Beside::new("m.hal", hal)];
         let error = read_with("m.ini", text, options).expect_err(hal);
         assert!(!error.mend().is_empty());
         said.push_str(&format!("{error}\n  = {}\n", error.mend()));
@@ -379,8 +379,7 @@ fn a_signal_that_is_set_sets_its_pins() {
     let mut options = ImportOptions::default();
     options.form = Some(Form::LinuxCnc);
     options.hal = vec!["m.hal".into()];
-    options.beside =
-        vec![Beside { file: "m.hal".into(), text: "net p maxkins.pivot-length\nsets p 10\n".into() }];
+    options.beside = vec![Beside::new("m.hal", "net p maxkins.pivot-length\nsets p 10\n")];
     let machine = read_with("m.ini", text, &options).expect("sound").machine;
     assert_eq!((machine.name(), machine.commands()), ("m", &["c", "x", "y", "z", "b"].map(String::from)[..]));
     let down = FRAC_PI_2;
@@ -395,7 +394,7 @@ fn no_beginning_of_a_configuration_and_no_gap_in_it_makes_the_reader_panic() {
     let with = |text: &str, hal: &str| {
         let mut options = ImportOptions::default();
         options.form = Some(Form::LinuxCnc);
-        options.beside = vec![Beside { file: "trunnion.hal".into(), text: hal.into() }];
+        options.beside = vec![Beside::new("trunnion.hal", hal)];
         read_with("trunnion.ini", text, &options)
     };
     assert!(with(&text, &hal).is_ok());

@@ -1,11 +1,14 @@
 //! What the interface promises beside its functions: values that go from thread to thread, and results that read back as they were written.
 
 use kincal::compensate::{CompensateOptions, Report, Setup, compensate_text};
+use kincal::convert::{self, Request};
 use kincal::describe::{Description, describe};
 use kincal::diagnose::{DiagnoseOptions, Diagnosis, diagnose};
 use kincal::effects::{Library, StoredEffect};
 use kincal::error::Fault;
+use kincal::export::{self, ExportOptions, Format};
 use kincal::identify::{CalibrateOptions, ErrorModel, Fit, Reach, calibrate, calibrate_model, reach};
+use kincal::import::{self, Form, ImportOptions, Imported};
 use kincal::inverse::{Goal, Inverse, InverseOptions, Solution};
 use kincal::lie::{Pose, Twist, Vec3, Wrench};
 use kincal::location::LocationErrors;
@@ -128,6 +131,32 @@ fn results_read_back_as_they_were_written() -> kincal::Result<()> {
         let json = there_and_back(&report);
         assert_eq!((&json["moves"], &json["machine_moves"]), (&3.into(), &1.into()), "{json}");
     }
+    Ok(())
+}
+
+#[test]
+fn results_of_foreign_files_read_back_as_they_were_written() -> kincal::Result<()> {
+    let mill = machine("xyz_mill");
+    let table = "Target [mm];1+ [um];1- [um];2+ [um];2- [um]\n0;-1,2;8,1;-1,0;8,4\n100;0,3;9,9;0,1;9,7\n200;1,8;11,2;2,1;11,0\n";
+    let request = Request::default().with_head("fixed y[mm]: 0").with_head("fixed z[mm]: 0").with_joint("x");
+    let converted = convert::read("laser.csv", table.as_bytes(), Some(&mill), &request)?;
+    let json = there_and_back(&converted);
+    assert_eq!((&json["positioning"]["joint"], &json["positioning"]["unit"]), (&"x".into(), &"m".into()));
+
+    let sheet =
+        "joint,kind,theta[deg],d[mm],a[mm],alpha[deg]\nq1,revolute,0,387,325,0\nq2,prismatic,0,0,0,0\n";
+    let imported = import::read_with("arm.csv", sheet, &ImportOptions::default().with_form(Form::Dh))?;
+    let json = there_and_back(&imported);
+    let read: Imported = serde_json::from_value(json).expect("it was read before");
+    assert_eq!(read, imported);
+    let refused = serde_json::json!({"text": "Machine(", "told": [], "beside": []});
+    let error = serde_json::from_value::<Imported>(refused).expect_err("no machine");
+    assert!(error.to_string().starts_with("imported:1:"), "{error}");
+
+    let exported =
+        export::export(&CalibratedMachine::nominal(imported.machine), Format::Dh, &ExportOptions::default())?;
+    let json = there_and_back(&exported);
+    assert!(json["numbers"][0]["declared"].is_number(), "{json}");
     Ok(())
 }
 

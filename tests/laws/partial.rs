@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common;
-use kincal::identify::{CalibrateOptions, Loss, Merged, Part, Round, calibrate, merge};
+use kincal::identify::{CalibrateOptions, Loss, Merged, PartialEquations, Round, calibrate, merge};
 use kincal::lie::Vec3;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
@@ -80,12 +80,16 @@ fn in_rounds(
     parts: &[&[Recording]],
     options: CalibrateOptions,
 ) -> (CalibratedMachine, kincal::identify::Fit, usize) {
-    let read = |part: Part| -> Part { through_file(&part.text(), |path| Part::open(path)) };
+    let read = |part: PartialEquations| -> PartialEquations {
+        through_file(&part.text(), |path| PartialEquations::open(path))
+    };
     let mut round: Option<Round> = None;
     for number in 0..100 {
-        let sums: Vec<Part> = parts
+        let sums: Vec<PartialEquations> = parts
             .iter()
-            .map(|own| read(Part::of(machine, own, round.as_ref()).unwrap_or_else(|e| panic!("{e}"))))
+            .map(|own| {
+                read(PartialEquations::of(machine, own, round.as_ref()).unwrap_or_else(|e| panic!("{e}")))
+            })
             .collect();
         assert!(sums.iter().all(|part| part.rounds() == number));
         match merge(&sums, options).unwrap_or_else(|e| panic!("{e}")) {
@@ -135,7 +139,8 @@ fn what_does_not_belong_together_is_refused() {
     let (machine, other) = (common::machine("ac_table_tilting"), common::machine("bc_table_tilting"));
     let all = of_several_kinds(&machine, 1.0);
     let options = CalibrateOptions::default();
-    let part = |own: &[Recording], at: Option<&Round>| Part::of(&machine, own, at).expect("a part");
+    let part =
+        |own: &[Recording], at: Option<&Round>| PartialEquations::of(&machine, own, at).expect("a part");
     let round = match merge(&[part(&all, None)], options).expect("a round") {
         Merged::Another(round) => *round,
         Merged::Found(_) => panic!("nothing has been summed"),
@@ -143,20 +148,20 @@ fn what_does_not_belong_together_is_refused() {
     assert_eq!(round.number(), 1);
     let (first, second) = (part(&all[..2], Some(&round)), part(&all[2..], Some(&round)));
     let foreign = recorded(&other, "b.csv", 1.0, Sensor::Position, &["setup: near"], 50);
-    let foreign = Part::of(&other, &[foreign], None).expect("a part");
-    let refused = |parts: &[Part]| merge(parts, options).expect_err("refused").to_string();
+    let foreign = PartialEquations::of(&other, &[foreign], None).expect("a part");
+    let refused = |parts: &[PartialEquations]| merge(parts, options).expect_err("refused").to_string();
     assert_eq!(refused(&[]), "no part is given");
     assert!(refused(&[part(&all, None), foreign]).starts_with("part 2 is of another machine"));
     assert!(refused(&[first.clone(), part(&all[2..], None)]).contains("1 round, another through 0 rounds"));
     assert_eq!(refused(std::slice::from_ref(&first)), "the parts hold 2 of 4 recordings");
     assert_eq!(refused(&[first.clone(), first.clone(), second]), "near.csv is in two parts");
-    let error = Part::of(&other, &[], Some(&round)).expect_err("another machine").to_string();
+    let error = PartialEquations::of(&other, &[], Some(&round)).expect_err("another machine").to_string();
     assert!(error.starts_with("the round is of another machine than \"bc_table_tilting\""), "{error}");
     let changed = recorded(&machine, "near.csv", 1.0, Sensor::Position, &["setup: elsewhere"], 10);
-    let error = Part::of(&machine, &[changed], Some(&round)).expect_err("changed").to_string();
+    let error = PartialEquations::of(&machine, &[changed], Some(&round)).expect_err("changed").to_string();
     assert!(error.starts_with("near.csv is none of the recordings of this round"), "{error}");
     for (text, what) in [(round.text(), "a part"), ("Part(".into(), "a part")] {
-        let error = in_file(&text, |path| Part::open(path)).expect_err("no part").to_string();
+        let error = in_file(&text, |path| PartialEquations::open(path)).expect_err("no part").to_string();
         assert!(error.contains(&format!("this is not {what}")), "{error}");
     }
     assert!(in_file(&first.text(), |path| Round::open(path)).is_err());

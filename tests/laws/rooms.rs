@@ -154,8 +154,7 @@ fn imports_run_one_way_within_every_room() {
         }
     }
     let mut wrong = Vec::new();
-    // The engine of the diagnosis is being rebuilt: its files still call each other through the search.
-    for (folder, files) in folders.iter().filter(|(folder, _)| *folder != "diagnose") {
+    for (folder, files) in &folders {
         let names: BTreeSet<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
         let mut edges: BTreeMap<&str, BTreeSet<String>> = BTreeMap::new();
         for (name, text) in files {
@@ -205,4 +204,32 @@ fn files_that_the_documents_name_are_there() {
         named_paths("as `src/lie.rs` and (../machines/a.ron), in `src/cli/`."),
         ["machines/a.ron", "src/cli/", "src/lie.rs"].into()
     );
+}
+
+/// Whoever has the package alone can follow every link of its first page; every page of the documents is in the list of pages.
+#[test]
+fn links_of_the_readme_are_in_the_package_and_all_pages_are_listed() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let manifest = read(&root.join("Cargo.toml"));
+    let list = manifest.split("include = [").nth(1).and_then(|rest| rest.split(']').next()).expect("a list");
+    let packed: Vec<&str> = list.split('"').filter_map(|entry| entry.strip_prefix('/')).collect();
+    let within = |link: &str, entry: &str| match entry.strip_suffix('*') {
+        Some(begin) => link.starts_with(begin),
+        None => link == entry || link.strip_prefix(entry).is_some_and(|rest| rest.starts_with('/')),
+    };
+    let readme = read(&root.join("README.md"));
+    let links = readme.split("](").skip(1).filter_map(|rest| rest.split([')', '#']).next());
+    let local = links.filter(|link| !link.is_empty() && !link.contains("://"));
+    let missing: BTreeSet<&str> =
+        local.filter(|link| !packed.iter().any(|entry| within(link, entry))).collect();
+    assert!(missing.is_empty(), "linked from README.md and not in the package: {missing:?}");
+
+    let map = read(&root.join("docs/README.md"));
+    let all = map.split("## All pages").nth(1).expect("the list of all pages");
+    let pages = std::fs::read_dir(root.join("docs")).expect("documents");
+    let names = pages.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());
+    let unlisted: Vec<_> = names
+        .filter(|name| name.ends_with(".md") && name != "README.md" && !all.contains(&format!("({name})")))
+        .collect();
+    assert!(unlisted.is_empty(), "not in the list of all pages: {unlisted:?}");
 }

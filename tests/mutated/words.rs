@@ -333,5 +333,6 @@ pub fn words(kind: Kind) -> &'static [&'static str] {
             "LN ",
             "TX+0 ",
         ],
+        Kind::Program(other) => unreachable!("{other:?} is not among the kinds"),
     }
 }

@@ -1,6 +1,6 @@
 //! Physics by name on recordings of real machines: effects that are given, not searched for, judged where they were not fitted.
 //!
-//! `cargo test --release --test real physics -- --ignored --nocapture` prints the figures of `docs/real-recordings.md`.
+//! `cargo test --release --test engine data_sets::physics -- --ignored --nocapture` prints the figures of `docs/real-recordings.md`.
 
 use kincal::effects::Library;
 use kincal::identify::{CalibrateOptions, ErrorModel, calibrate_model};

@@ -1,6 +1,6 @@
 //! Recordings of real machines, other people's data beside the project: geometry alone, judged where it was not fitted.
 //!
-//! `cargo test --release --test real recordings -- --ignored --nocapture` prints the figures of `docs/accuracy.md`;
+//! `cargo test --release --test engine data_sets::recordings -- --ignored --nocapture` prints the figures of `docs/accuracy.md`;
 //! the sections `losses` and `tolerances` of `examples/benchmarks` say how losses and tolerances compare.
 
 use kincal::identify::{CalibrateOptions, calibrate};

@@ -7,6 +7,7 @@ use super::text::{not_tried, tests};
 use crate::cli::output::Kind;
 use crate::diagnose::Diagnosis;
 use crate::identify::{Fit, ParameterFit};
+use crate::wording::count;
 
 /// Share of the data from which a component is listed, and below which a combination counts as not seen.
 const MOSTLY: f64 = 0.7;
@@ -108,8 +109,9 @@ pub(super) fn next(fit: &Fit, diagnosis: Option<&Diagnosis>, still: &[&str]) -> 
     }
     if fit.rank < fit.rank_in_general {
         add(format!(
-            "poses all over the travel with all axes moving: {} instead of {} combinations",
-            fit.rank_in_general, fit.rank
+            "poses all over the travel with all axes moving: {} instead of {}",
+            fit.rank_in_general,
+            count(fit.rank as u64, "combination", "combinations")
         ));
     }
     let hidden = fit.combinations.iter().filter(|c| c.share < HARDLY).count();
