@@ -52,6 +52,11 @@ fn play_of_a_width_trails_the_drive_and_crosses_at_a_reversal() {
     let (machine, samples) = along(&[0.0, 1.0, 0.9, 0.8, 0.5, 0.6]);
     let play = feature(&machine, "Play(Parameter(\"width\"))", &["width"]);
     close(&play.over(&samples, &[0.2e-3]), &[-1e-4, -1e-4, 0.0, 1e-4, 1e-4, 0.0], 1e-12);
+    // What an expression drives begins in the middle. The drive moves twice as far as the joint here.
+    let twice = "PlayOf(Product([Number(2), Position]), Product([Number(2), Parameter(\"width\")]))";
+    let play = feature(&machine, twice, &["width"]);
+    close(&play.over(&samples, &[0.2e-3]), &[0.0, -2e-4, 0.0, 2e-4, 2e-4, 0.0], 1e-12);
+    assert!(play.needs_history() && play.remembers());
 }
 
 #[test]
@@ -105,6 +110,7 @@ fn derivatives_by_parameters_are_those_of_central_differences() {
     let (machine, samples) = along(&path);
     for (text, p) in [
         ("Play(Parameter(\"p\"))", 1.234e-3),
+        ("PlayOf(Product([Position, Sum([Number(1), Parameter(\"p\")])]), Value(1.3, \"mm\"))", 0.2),
         ("TakeUp(Parameter(\"p\"))", 2e-3),
         ("Lag(Abs(Velocity), Parameter(\"p\"))", 0.3),
         ("Sin(Quotient(Position, Parameter(\"p\")))", 5e-3),
@@ -128,7 +134,7 @@ fn derivatives_by_parameters_are_those_of_central_differences() {
 #[test]
 fn a_feature_in_words_binds_to_itself_again() {
     let (machine, samples) = along(&[0.0, 5.0, 4.0, 5.0, 50.0, 49.0]);
-    let text = "Product([TakeUp(Parameter(\"p\")), Chebyshev(3, Stroke), Exp(Difference(Number(0), Quotient(Time, Value(2, \"s\"))))])";
+    let text = "Product([TakeUp(Parameter(\"p\")), PlayOf(Position, Value(2, \"mm\")), Chebyshev(3, Stroke), Exp(Difference(Number(0), Quotient(Time, Value(2, \"s\"))))])";
     let one = feature(&machine, text, &["p"]).with(&[1e-3]);
     let stored = ron::to_string(&one.to_expression(&machine, &[])).expect("RON");
     let again = feature(&machine, &stored, &[]);
