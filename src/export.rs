@@ -42,7 +42,8 @@ pub enum Format {
     ErrorMotions,
     /// A robot description, m and rad: a new one, or the origins of [`ExportOptions::base_file`].
     Urdf,
-    /// A model of MuJoCo, m and rad: the geometry, joints that follow others, play.
+    /// A model of MuJoCo, m and rad: the geometry, joints that follow others, play, friction, compliance, lag, and an actuator for the
+    /// position and the rate of every command.
     Mjcf,
     /// Denavit-Hartenberg parameters, standard convention.
     Dh,
@@ -180,7 +181,7 @@ pub struct Number {
     pub value: Option<f64>,
     /// What the machine file as declared would give, in `unit`.
     pub declared: f64,
-    /// `mm`, `um`, `m`, `urad`, `rad` or `1`.
+    /// `mm`, `um`, `m`, `urad`, `rad`, `s`, `N`, `Nm`, `N/m`, `Nm/rad` or `1`.
     pub unit: String,
     /// Why there is no value.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -83,15 +83,42 @@ fn a_spring_under_the_masses_of_the_model_yields_as_the_file_says() {
 }
 
 #[test]
+fn masses_that_nobody_states_are_weights_of_their_own() {
+    // Where the file states no mass, the effect counts 1 kg at every frame beyond, and so does the model.
+    let exported = model(&arm(&effect(COMPLIANCE, "Gravity"), false));
+    assert!(exported.left_out.is_empty(), "{:?}", exported.left_out);
+    let weights = exported.text.lines().filter(|line| line.contains("<body name=\"weight "));
+    assert_eq!(weights.filter(|line| line.contains("mass=\"1\"")).count(), 2);
+    // Besides what it states, 3 kg at the end, and a first moment of -0.5 kg m across the first joint.
+    let part = |value: f64, feature: &str| {
+        format!(
+            "(value: {value:e}, parts: [(slot: Before(\"q1\"), v: (0, 0, 0), w: (0, 1, 0), feature: Of(\"q1\", {feature}))])"
+        )
+    };
+    let terms = [(1.0, "Gravity"), (3.0, "Load"), (-0.5, "Lever(0, 0)")]
+        .map(|(by, feature)| part(by * COMPLIANCE, feature));
+    let effect = format!("(effect: \"gravity_compliance\", at: \"q1\", terms: [{}])", terms.join(", "));
+    let exported = model(&arm(&effect, true));
+    assert!(exported.left_out.is_empty(), "{:?}", exported.left_out);
+    let weights: Vec<&str> =
+        exported.text.lines().filter(|line| line.contains("<body name=\"weight ")).collect();
+    assert_eq!(weights.len(), 3);
+    assert_eq!(weights.iter().filter(|line| line.contains("mass=\"0.5\"")).count(), 2);
+    // One of the two that make a moment pulls upwards.
+    assert_eq!(weights.iter().filter(|line| line.contains("gravcomp=\"2\"")).count(), 1);
+    assert!(weights.iter().any(|line| line.contains("mass=\"3") && line.contains("of t\"")), "{weights:?}");
+}
+
+#[test]
 fn what_is_no_spring_is_listed() {
     for (calibrated, why) in [
         (arm(&effect(-COMPLIANCE, "Gravity"), true), "it would push against its load"),
-        (arm(&effect(COMPLIANCE, "Load"), true), "the mass is not in the file"),
-        (arm(&effect(COMPLIANCE, "Gravity"), false), "no mass is in the file"),
+        (arm(&effect(COMPLIANCE, "Load"), true), "the stated masses have no part in it"),
     ] {
         let exported = model(&calibrated);
         assert!(!exported.text.contains("compliance of"), "{why}");
         let listed: Vec<&str> = exported.left_out.iter().map(|left| left.what.as_str()).collect();
         assert_eq!(listed, ["gravity_compliance at q1"], "{why}");
+        assert!(exported.left_out[0].because.contains("no spring does that"), "{why}");
     }
 }

@@ -22,6 +22,7 @@ mod effects;
 mod effects_in_files;
 mod export;
 mod export_controls;
+mod export_drives;
 mod export_motions;
 mod export_springs;
 mod features;
