@@ -32,7 +32,8 @@ const GRAVITY: f64 = 9.80665;
 pub(super) fn write(calibrated: &CalibratedMachine) -> Result<Exported> {
     let machine = calibrated.machine();
     let (drives, refused) = drives(calibrated)?;
-    let weights = weights(machine, &drives);
+    let pull_of = |joint: &str| drives.iter().find(|drive| drive.joint == joint)?.pull.as_ref();
+    let weights = weights(machine, pull_of);
     let mut exported = told(calibrated, &drives, &refused, !weights.is_empty())?;
     let mut text = format!("<!-- {} -->\n", escaped(&heading(machine.name(), "MJCF")));
     exported.told.iter().for_each(|line| {

@@ -1,6 +1,5 @@
 //! What pulls at springs besides the masses that the machine file states: stand-ins for masses that nobody has stated.
 
-use super::drive::Drive;
 use crate::lie::Vec3;
 use crate::machine::{JointKind, Machine};
 
@@ -36,15 +35,13 @@ pub(super) fn lever(machine: &Machine, j: usize, beyond: u8, direction: u8) -> O
     (joint.kind == JointKind::Revolute).then_some((k, across))
 }
 
-/// All of a model.
-pub(super) fn weights(machine: &Machine, drives: &[Drive]) -> Vec<Weight> {
+/// All of a model, given what the spring of a joint asks for.
+pub(super) fn weights<'a>(machine: &Machine, pull_of: impl Fn(&str) -> Option<&'a Pull>) -> Vec<Weight> {
     let mut weights: Vec<Weight> = Vec::new();
     let at_origin = |dyad, mass| Weight { dyad, mass, centre: Vec3([0.0; 3]) };
     let dyads = machine.dyads();
-    for (j, _) in machine.joints() {
-        let own =
-            drives.iter().find(|drive| Some(&drive.joint) == dyads[j].joint.as_ref().map(|own| &own.name));
-        let Some(pull) = own.and_then(|drive| drive.pull.as_ref()) else { continue };
+    for (j, joint) in machine.joints() {
+        let Some(pull) = pull_of(&joint.name) else { continue };
         let mut beyond = (j..dyads.len()).filter(|k| machine.branch(*k) == machine.branch(j));
         let stated = beyond.clone().any(|k| dyads[k].mass.is_some_and(|mass| mass.mass > 0.0));
         let end = beyond.next_back();
