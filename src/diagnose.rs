@@ -75,7 +75,7 @@ inner! {
     use pictures::{Along, Curve, CurvePoint, Trace, Traces};
 }
 pub use diagnosis::{
-    Companion, Diagnosis, HeldOutRms, LeftOutRms, Outliers, RmsByModel, SaidBy, SetUpLeftOut, StandsStill,
+    Diagnosis, HeldOutRms, LeftOutRms, Outliers, RmsByModel, SaidBy, SetUpLeftOut, SharedEffect, StandsStill,
     Thinned, WithoutOutliers,
 };
 pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size, Where};

@@ -15,11 +15,11 @@ const CLOSE: f64 = 0.6;
 const REFINED: usize = 8;
 /// Where effects show their shape, hypotheses with this part of the best one's energy are looked at, so many.
 const SIMILAR: f64 = 0.8;
-const SHAPED: usize = 8;
+const DISCREPANT: usize = 8;
 /// What comes within this part of the best one's energy is a matter of shape, and the more common name is to be preferred.
-const UNKNOWN_SHAPE: f64 = 0.002;
+const UNKNOWN_DISCREPANCY: f64 = 0.002;
 /// So is the one that needs less of a shape of its own: the whole slack is lost by one that owes this part of the energy to it.
-const BENT: f64 = 0.05;
+const DEPARTURE: f64 = 0.05;
 
 impl Search<'_> {
     /// Evidence of every candidate beside the effects in the model, better first.
@@ -85,15 +85,17 @@ impl Search<'_> {
         if most > LARGE && rows.whitener.count() > MANY {
             let alike: Vec<usize> = (0..close)
                 .filter(|i| hypotheses[*i].reach / overdispersion > SIMILAR * most)
-                .take(SHAPED)
+                .take(DISCREPANT)
                 .collect();
             let weights: Vec<f64> =
-                alike.par_iter().map(|i| self.with_shape(&hypotheses[*i], &field)).collect();
+                alike.par_iter().map(|i| self.with_discrepancy(&hypotheses[*i], &field)).collect();
             alike.iter().zip(weights).for_each(|(i, weight)| hypotheses[*i].weight = weight);
-            let slack = (UNKNOWN_SHAPE * most).min(VISIBLE * rows.whitener.count() as f64 / overdispersion);
+            let slack =
+                (UNKNOWN_DISCREPANCY * most).min(VISIBLE * rows.whitener.count() as f64 / overdispersion);
             for hypothesis in &mut hypotheses[..close] {
-                let bent = ((most - hypothesis.reach / overdispersion) / (BENT * most)).clamp(0.0, 1.0);
-                hypothesis.weight += slack * (self.commonness[hypothesis.candidate] - bent);
+                let departure =
+                    ((most - hypothesis.reach / overdispersion) / (DEPARTURE * most)).clamp(0.0, 1.0);
+                hypothesis.weight += slack * (self.commonness[hypothesis.candidate] - departure);
             }
             hypotheses.sort_by(better_first);
         }

@@ -35,7 +35,7 @@ pub(super) fn says_no_more(search: &Search, in_model: &[ModelTerm], i: usize) ->
     if candidate.more_than.is_empty() {
         return false;
     }
-    let field = search.rows.field(search.ground(in_model, Some(i)).with(&effect.state));
+    let field = search.rows.field(search.ground(in_model, Some(i)).with(&effect.initial));
     let gain = |candidate: &Candidate, parameters: &[f64]| {
         let score = search.rows.score_at(candidate, parameters, &field, search.overdispersion);
         score.map_or(0.0, |score| score.gain)

@@ -21,7 +21,7 @@ impl Search<'_> {
         else {
             return in_model;
         };
-        if self.shares(&in_model).shapes < 2.0 * least {
+        if self.shares(&in_model).discrepancies < 2.0 * least {
             return in_model;
         }
         let is_aside = |candidate: usize| self.is_form(candidate, largest.candidate);
@@ -53,6 +53,6 @@ impl Search<'_> {
 
     /// Logarithm of the evidence of all effects in the model together, their shapes the families'.
     fn worth_plainly(&self, in_model: &[ModelTerm]) -> f64 {
-        self.worth(&in_model.iter().map(ModelTerm::without_shape).collect::<Vec<_>>())
+        self.worth(&in_model.iter().map(ModelTerm::without_discrepancy).collect::<Vec<_>>())
     }
 }

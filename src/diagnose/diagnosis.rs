@@ -45,8 +45,8 @@ pub struct Diagnosis {
     /// What was found, strongest evidence first.
     pub findings: Vec<Finding>,
     /// Joints that have an effect of the findings too, which comes anew with every set-up; the model has them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub companions: Vec<Companion>,
+    #[serde(default, rename = "companions", skip_serializing_if = "Vec::is_empty")]
+    pub shared: Vec<SharedEffect>,
     /// Joints that stand still all through a recording, and have an effect that depends on how they came there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stand_still: Vec<StandsStill>,
@@ -58,7 +58,7 @@ pub struct Diagnosis {
     /// Part of the structure left over by geometry that is no family's shape, 0 to 1, where something was found.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape_share: Option<f64>,
-    /// What the calibrated file is made of: the effects of `findings` and `companions`, ready to be fitted on the real model.
+    /// What the calibrated file is made of: the effects of `findings` and `shared`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
     /// Effects that could not be looked for in these recordings.
@@ -226,7 +226,7 @@ pub struct LeftOutRms {
 /// A joint that has an effect of the findings too, so little that it is no finding; the model has it.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Companion {
+pub struct SharedEffect {
     /// Name of the effect.
     pub effect: String,
     /// Name of the place.

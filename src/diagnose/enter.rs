@@ -1,4 +1,4 @@
-//! Effects taken in: their columns, their states and shapes, and their coefficients.
+//! Effects taken in: their columns, their initial conditions and discrepancies, and their coefficients.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Candidate;
 use crate::feature::Feature;
 
-/// Parameters are others beside unknown states where that brings so much, as a logarithm.
+/// Parameters are others beside unknown initial conditions where that brings so much, as a logarithm.
 const MOVED: f64 = 3.0;
 
 impl Search<'_> {
@@ -23,10 +23,10 @@ impl Search<'_> {
     pub(super) fn settle(&self, hypothesis: &Hypothesis, marginal: &Arc<Marginal>) -> Option<ModelTerm> {
         let entered = self.enter(hypothesis, marginal)?;
         let candidate = &self.candidates[hypothesis.candidate];
-        if entered.state.ncols() == 0 || candidate.parameters.iter().all(|p| p.whole) {
+        if entered.initial.ncols() == 0 || candidate.parameters.iter().all(|p| p.whole) {
             return Some(entered);
         }
-        let beside = self.rows.field(marginal.with(&entered.state));
+        let beside = self.rows.field(marginal.with(&entered.initial));
         let score =
             self.rows.score_at(candidate, &hypothesis.score.parameters, &beside, self.overdispersion)?;
         let start = Hypothesis::new(hypothesis.candidate, score.evidence, score);
@@ -63,12 +63,12 @@ impl Search<'_> {
                 effect.solution = solved(gram, &toward)?;
             }
         }
-        effect.state = self.state_of(&effect);
-        effect.shape = discrepancy::columns(self.rows, candidate, &effect);
+        effect.initial = self.initial_of(&effect);
+        effect.discrepancy = discrepancy::columns(self.rows, candidate, &effect);
         Some(effect)
     }
 
-    /// The same without states and shape.
+    /// The same without initial conditions and discrepancy.
     pub fn enter_bare(&self, hypothesis: &Hypothesis, marginal: &Marginal) -> Option<ModelTerm> {
         self.enter_as(&self.candidates[hypothesis.candidate], hypothesis, marginal)
     }
@@ -93,27 +93,27 @@ impl Search<'_> {
         }
         let solution = solved(gram, &toward)?;
         let none = DMatrix::zeros(columns.nrows(), 0);
-        let (state, shape) = (none.clone(), none);
+        let (initial, discrepancy) = (none.clone(), none);
         Some(ModelTerm {
             candidate: hypothesis.candidate,
             score,
             columns,
             solution,
-            state,
-            shape,
+            initial,
+            discrepancy,
             near: Vec::new(),
             hidden: false,
         })
     }
 
     /// Columns of what an effect was before anybody looked.
-    pub fn state_of(&self, effect: &ModelTerm) -> DMatrix<f64> {
-        self.states_of(effect)
-            .map_or_else(|| DMatrix::zeros(effect.columns.nrows(), 0), |states| states.white)
+    pub fn initial_of(&self, effect: &ModelTerm) -> DMatrix<f64> {
+        self.initial_conditions_of(effect)
+            .map_or_else(|| DMatrix::zeros(effect.columns.nrows(), 0), |initial| initial.white)
     }
 
     /// The same, with what they are made of; `None` among settled positions, where every side of approach is known.
-    pub fn states_of(&self, effect: &ModelTerm) -> Option<discrepancy::Columns> {
+    pub fn initial_conditions_of(&self, effect: &ModelTerm) -> Option<discrepancy::Columns> {
         let candidate = &self.candidates[effect.candidate];
         let answers = || discrepancy::answers(self.rows, candidate, effect);
         self.in_motion.then(|| discrepancy::initial_conditions(self.rows, candidate, effect, answers()))

@@ -174,7 +174,7 @@ fn foretold_without(search: &Search, in_model: &[ModelTerm]) -> Option<Vec<f64>>
     let all = normal.foretold(&|_| true)?;
     let bends = |i: usize| {
         let others = all_but(in_model, Some(i));
-        !others.is_empty() && search.shares(&others).is_misshapen(others.len())
+        !others.is_empty() && search.shares(&others).is_discrepant(others.len())
     };
     let without = |i: usize| {
         let better = normal.foretold(&|other| other != i).map(|without| without - all);
@@ -189,7 +189,7 @@ pub(super) fn foretell_better(search: &Search, these: &[ModelTerm], others: &[Mo
     foretold(these).zip(foretold(others)).is_some_and(|(these, others)| these > others)
 }
 
-/// Whitened normal equations of each fold, with everything that an effect brings along: states and shape.
+/// Whitened normal equations of each fold, with everything that an effect brings along: initial conditions and discrepancy.
 struct Normal {
     folds: Vec<(DMatrix<f64>, DVector<f64>)>,
     /// Of each column, which effect it belongs to.
@@ -204,10 +204,10 @@ impl Normal {
         rows.whiten(&mut white);
         let mut owner = vec![None; white.ncols()];
         // Where one stands for what was the shape of another, the shape of either would do without the other.
-        let shaped = !in_model.iter().any(|effect| effect.hidden);
+        let with_discrepancies = !in_model.iter().any(|effect| effect.hidden);
         for (i, effect) in in_model.iter().enumerate() {
-            let all = [&effect.columns, &effect.state, &effect.shape];
-            for own in &all[..if shaped { 3 } else { 2 }] {
+            let all = [&effect.columns, &effect.initial, &effect.discrepancy];
+            for own in &all[..if with_discrepancies { 3 } else { 2 }] {
                 let at = white.ncols();
                 white = white.insert_columns(at, own.ncols(), 0.0);
                 white.columns_mut(at, own.ncols()).copy_from(own);
@@ -361,8 +361,8 @@ impl Folds {
             put(&effect.raw(search)?, Part::Effect(i));
         }
         for (i, effect) in told.iter().enumerate() {
-            if let Some(states) = search.states_of(effect) {
-                put(&states.raw(rows), Part::InitialCondition(i));
+            if let Some(initial) = search.initial_conditions_of(effect) {
+                put(&initial.raw(rows), Part::InitialCondition(i));
             }
         }
         let mut white = raw.clone();

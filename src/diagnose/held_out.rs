@@ -55,7 +55,7 @@ impl Model {
         for effect in in_model {
             let at = columns.ncols();
             offsets.push(at);
-            for own in [&effect.columns, &effect.state] {
+            for own in [&effect.columns, &effect.initial] {
                 let at = columns.ncols();
                 columns = columns.insert_columns(at, own.ncols(), 0.0);
                 columns.columns_mut(at, own.ncols()).copy_from(own);
@@ -95,12 +95,12 @@ impl Model {
     /// What effect `i` was before anybody looked, beside what its family says, m and rad; `None` where that is known.
     pub fn early(&self, search: &Search, in_model: &[ModelTerm], i: usize) -> Option<Vec<f64>> {
         let effect = &in_model[i];
-        if effect.state.ncols() == 0 {
+        if effect.initial.ncols() == 0 {
             return None;
         }
-        let states = search.states_of(effect)?;
-        let numbers = self.solution.rows(self.offsets[i] + effect.columns.ncols(), effect.state.ncols());
-        Some(states.sum(search.rows, numbers.as_slice()))
+        let initial = search.initial_conditions_of(effect)?;
+        let numbers = self.solution.rows(self.offsets[i] + effect.columns.ncols(), effect.initial.ncols());
+        Some(initial.sum(search.rows, numbers.as_slice()))
     }
 
     /// The same with the constants alone taken away, and the effects that fulfil a condition.
@@ -128,9 +128,9 @@ impl Model {
         left.as_slice().to_vec()
     }
 
-    /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together. `shape`: part of
+    /// Coefficients of effect `i` with their covariance; parameters by their derivatives, all solved together. `discrepancy`: part of
     /// what shapes may depart from the families' by which they do.
-    pub fn effect(&self, search: &Search, in_model: &[ModelTerm], i: usize, shape: f64) -> Solved {
+    pub fn effect(&self, search: &Search, in_model: &[ModelTerm], i: usize, discrepancy: f64) -> Solved {
         let effect = &in_model[i];
         let candidate = &search.candidates[effect.candidate];
         let units = search.rows.units(candidate, &effect.score.parameters);
@@ -160,8 +160,8 @@ impl Model {
         }
         for effect in in_model {
             let at = wide.ncols();
-            wide = wide.insert_columns(at, effect.shape.ncols(), 0.0);
-            wide.columns_mut(at, effect.shape.ncols()).copy_from(&(&effect.shape * shape));
+            wide = wide.insert_columns(at, effect.discrepancy.ncols(), 0.0);
+            wide.columns_mut(at, effect.discrepancy.ncols()).copy_from(&(&effect.discrepancy * discrepancy));
         }
         let Some(factor) = with_prior(gram(&wide, &wide)) else { return Solved { coefficients, covariance } };
         let inverse = factor.inverse();

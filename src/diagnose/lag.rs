@@ -22,7 +22,7 @@ const BETTER: f64 = 0.9;
 
 /// Candidates as they are where axes follow their commands as late as was found; `plain`: as they are where none is late. `None` where
 /// noise would hide what that changes.
-pub(super) fn late(search: &Search, in_model: &[ModelTerm], plain: &[Candidate]) -> Option<Vec<Candidate>> {
+pub(super) fn lagged(search: &Search, in_model: &[ModelTerm], plain: &[Candidate]) -> Option<Vec<Candidate>> {
     let model = Model::new(search, in_model);
     let mut lags: BTreeMap<usize, f64> = BTreeMap::new();
     for (i, effect) in in_model.iter().enumerate() {
@@ -44,8 +44,8 @@ pub(super) fn late(search: &Search, in_model: &[ModelTerm], plain: &[Candidate])
         discrepancy::is_of_position(candidate)
             && candidate.features[0].joints().iter().all(|j| lags.contains_key(j))
     };
-    let late = |f: &Feature| lags.iter().fold(f.clone(), |f, (j, by)| f.late(*j, *by));
-    let features = |candidate: &Candidate| candidate.features.iter().map(late).collect::<Vec<Feature>>();
+    let lagged = |f: &Feature| lags.iter().fold(f.clone(), |f, (j, by)| f.late(*j, *by));
+    let features = |candidate: &Candidate| candidate.features.iter().map(lagged).collect::<Vec<Feature>>();
     let less = |candidate: &Candidate| Candidate { features: features(candidate), ..candidate.clone() };
     let delayed = |candidate: &Candidate| Candidate {
         more_than: candidate.more_than.iter().map(less).collect(),

@@ -230,8 +230,8 @@ impl Unnamed {
             .collect();
         all.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         let best = search.enter_bare(&all.first()?.hypothesis, &ground)?;
-        let state = search.state_of(&best);
-        Some(Names { all, best: ModelTerm { state, near: families, ..best } })
+        let initial = search.initial_of(&best);
+        Some(Names { all, best: ModelTerm { initial, near: families, ..best } })
     }
 
     /// What the free functions of the group say beside the `ground`; `None` where that is nothing.

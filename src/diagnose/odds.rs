@@ -30,9 +30,9 @@ pub(super) struct Odds<'a> {
     pub is_listed: bool,
 }
 /// How often a name is right that evidence alone makes certain, on cases whose answers are known: less where shapes take up much
-/// (`shape`, a part of the structure), and where the evidence (`bic`, twice its logarithm) is slight.
-pub(super) fn trust(shape: f64, bic: f64) -> f64 {
-    let (odd, slight) = ((shape / ODDER).powi(3), (SLIGHT / bic.max(1e-9)).powi(2));
+/// (`discrepancy`, a part of the structure), and where the evidence (`bic`, twice its logarithm) is slight.
+pub(super) fn trust(discrepancy: f64, bic: f64) -> f64 {
+    let (odd, slight) = ((discrepancy / ODDER).powi(3), (SLIGHT / bic.max(1e-9)).powi(2));
     (LEAST + (1.0 - LEAST) / (1.0 + odd)) / (1.0 + slight)
 }
 

@@ -31,7 +31,7 @@ pub(super) fn outbid(
     // Orders of one error motion are each other's shape.
     let are_one = in_model[1..].iter().all(|effect| search.is_one(in_model[0].candidate, effect.candidate));
     let names = if are_one {
-        let plain: Vec<ModelTerm> = in_model.iter().map(ModelTerm::without_shape).collect();
+        let plain: Vec<ModelTerm> = in_model.iter().map(ModelTerm::without_discrepancy).collect();
         log_mean_exp(&[search.worth(in_model), search.worth(&plain)]) + rare
     } else {
         search.worth(in_model) + rare

@@ -122,7 +122,7 @@ impl Unnamed {
                 told = told.or(Some(term));
             }
             let Some(term) = next else { break };
-            all.push(ModelTerm { state: search.state_of(&term), ..term });
+            all.push(ModelTerm { initial: search.initial_of(&term), ..term });
         }
         // What came later may say what was said before.
         while let Some(i) = (first..all.len()).find(|i| !is_foretold(search, &all, *i)) {

@@ -39,7 +39,7 @@ pub(super) fn placebo(
     // Half the energy that it takes away, and its evidence; what it was before anybody looked is no less its own.
     let says = |candidate: &Candidate, score: &Score| {
         let hypothesis = Hypothesis::new(effect.candidate, score.at_best, score.clone());
-        match search.with_state(candidate, &hypothesis, &field) {
+        match search.with_initial(candidate, &hypothesis, &field) {
             Some(more) if more.evidence > 0.0 => (more.reach, score.at_best + more.evidence),
             _ => (score.gain, score.at_best),
         }

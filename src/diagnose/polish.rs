@@ -39,7 +39,7 @@ impl Search<'_> {
         let effect = &in_model[i];
         let candidate = &self.candidates[effect.candidate];
         let beside = self.beside(in_model, Some(i));
-        let field = self.rows.field(beside.with(&effect.state));
+        let field = self.rows.field(beside.with(&effect.initial));
         let at = |parameters: &[f64]| self.rows.score_at(candidate, parameters, &field, self.overdispersion);
         let start = at(&effect.score.parameters)?;
         let mut best = start.clone();

@@ -122,7 +122,7 @@ fn law(
                 && laws.moves_alike(taken, other)
                 && !(has_grid(taken) && has_grid(other))
         });
-        all.push(ModelTerm { state: search.state_of(&term), ..term });
+        all.push(ModelTerm { initial: search.initial_of(&term), ..term });
         // What came later may say what was said before.
         if let Some(i) = (others.len()..all.len()).find(|i| !is_foretold(search, &all, *i)) {
             all.remove(i);

@@ -44,9 +44,9 @@ impl Search<'_> {
         let worthy = hypotheses.iter().take_while(|r| r.weight > DISTANT * best.0).count();
         let chosen: Vec<usize> =
             (0..worthy).filter(|i| remembers(&hypotheses[*i])).take(REMEMBERED).collect();
-        let with_state =
-            |i: &usize| self.with_state(&self.candidates[hypotheses[*i].candidate], &hypotheses[*i], field);
-        let more: Vec<Option<WithState>> = chosen.par_iter().map(with_state).collect();
+        let with_initial =
+            |i: &usize| self.with_initial(&self.candidates[hypotheses[*i].candidate], &hypotheses[*i], field);
+        let more: Vec<Option<WithState>> = chosen.par_iter().map(with_initial).collect();
         for (i, more) in chosen.into_iter().zip(more) {
             let Some(more) = more else { continue };
             ranks[i] = hypotheses[i].weight + more.evidence.max(0.0);
@@ -58,7 +58,7 @@ impl Search<'_> {
     }
 
     /// What a hypothesis, taken for this candidate, says together with what it was before; `None` where it has no memory, or all of that is known.
-    pub fn with_state(
+    pub fn with_initial(
         &self,
         candidate: &Candidate,
         hypothesis: &Hypothesis,
@@ -66,14 +66,14 @@ impl Search<'_> {
     ) -> Option<WithState> {
         let effect = self.enter_as(candidate, hypothesis, &field.marginal).filter(|_| self.in_motion)?;
         let answers = discrepancy::answers(self.rows, candidate, &effect);
-        let state = discrepancy::initial_conditions(self.rows, candidate, &effect, answers).white;
-        if state.ncols() == 0 {
+        let initial = discrepancy::initial_conditions(self.rows, candidate, &effect, answers).white;
+        if initial.ncols() == 0 {
             return None;
         }
-        let beside = self.rows.field(field.marginal.with(&state));
+        let beside = self.rows.field(field.marginal.with(&initial));
         let score =
             self.rows.score_at(candidate, &hypothesis.score.parameters, &beside, self.overdispersion)?;
-        let worth = field.marginal.worth(&state, &field.left, self.overdispersion);
+        let worth = field.marginal.worth(&initial, &field.left, self.overdispersion);
         Some(WithState {
             evidence: worth + score.at_best - hypothesis.score.at_best,
             reach: score.gain + (worth * self.overdispersion).max(0.0),
@@ -81,25 +81,27 @@ impl Search<'_> {
     }
 
     /// The weight of a hypothesis of which as likely as not the shape departs from the family's, (66).
-    pub fn with_shape(&self, hypothesis: &Hypothesis, field: &Field) -> f64 {
+    pub fn with_discrepancy(&self, hypothesis: &Hypothesis, field: &Field) -> f64 {
         let Some(effect) = self.enter(hypothesis, &field.marginal) else { return hypothesis.weight };
-        let with_state = self.rows.field(field.marginal.with(&effect.state));
-        let shaped = self.rows.field(with_state.marginal.with(&effect.shape));
+        let with_initial = self.rows.field(field.marginal.with(&effect.initial));
+        let with_discrepancies = self.rows.field(with_initial.marginal.with(&effect.discrepancy));
         let candidate = &self.candidates[hypothesis.candidate];
         let grown = |field: &Field| {
             let score =
                 self.rows.score_at(candidate, &hypothesis.score.parameters, field, self.overdispersion)?;
             Some(score.at_best - hypothesis.score.at_best)
         };
-        let (Some(by_state), Some(by_shape)) = (grown(&with_state), grown(&shaped)) else {
+        let (Some(by_initial), Some(by_discrepancy)) = (grown(&with_initial), grown(&with_discrepancies))
+        else {
             return hypothesis.weight;
         };
-        let state = hypothesis.weight + field.marginal.worth(&effect.state, &field.left, self.overdispersion);
-        let shape =
-            (1.0 - FOREIGN) * with_state.marginal.worth(&effect.shape, &with_state.left, self.overdispersion);
+        let initial =
+            hypothesis.weight + field.marginal.worth(&effect.initial, &field.left, self.overdispersion);
+        let discrepancy = (1.0 - FOREIGN)
+            * with_initial.marginal.worth(&effect.discrepancy, &with_initial.left, self.overdispersion);
         // What owes more to a shape of its own than right names do owes it to something else.
-        let weight =
-            (state + shape + by_shape).min(state + by_state + OWN * hypothesis.reach / self.overdispersion);
+        let weight = (initial + discrepancy + by_discrepancy)
+            .min(initial + by_initial + OWN * hypothesis.reach / self.overdispersion);
         log_mean_exp(&[hypothesis.weight, weight])
     }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::along::along_travel;
 use super::approaches::approaches;
 use super::contained::says_no_more;
-use super::diagnosis::{Companion, Diagnosis, Named, Thinned};
+use super::diagnosis::{Diagnosis, Named, SharedEffect, Thinned};
 use super::finding::{Confusable, Finding, Meaningless, Size};
 use super::folds;
 use super::held_out::Model;
@@ -57,7 +57,7 @@ const ALONG: f64 = 4.5;
 /// Logarithm of the evidence at which a series (69) is structure: there are some hundred of them.
 const STANDING: f64 = 12.0;
 /// Where shapes make up less than this part of all, the names are no patches, whatever surprises.
-const ODD_SHAPE: f64 = 0.05;
+const ODD_DISCREPANCY: f64 = 0.05;
 /// A common effect of which the shape is less than this part of all is what it looks like.
 const PLAIN: f64 = 0.01;
 /// Names whose odds are no less than this part of the best one's cannot be told from it.
@@ -137,7 +137,7 @@ pub(super) fn report(
     all.sort_by(|(a, _), (b, _)| b.1.delta_bic.total_cmp(&a.1.delta_bic));
     let (told, placebos): (Vec<_>, Vec<_>) = all.into_iter().unzip();
     let kept: Vec<ModelTerm> = told.iter().map(|(i, ..)| in_model[*i].clone()).collect();
-    let mut companions = shared::companions(search, library, &kept);
+    let mut shared_effects = shared::effects(search, library, &kept);
     let mut told: Vec<Told> = (told.into_iter().zip(placebos).zip(kept))
         .map(|(((_, finding, named), placebo), term)| Told { term, finding, named, placebo })
         .collect();
@@ -150,11 +150,12 @@ pub(super) fn report(
     let wide = unnamed.as_ref().zip(wide.as_ref()).map(|(unnamed, rows)| unnamed.search(search, rows));
     let (narrow, search) = (search, wide.as_ref().unwrap_or(search));
     let (mut parts, mut of_parts, mut unexplained) = (Vec::new(), Vec::new(), None);
-    let mut of_companions = None;
+    let mut of_shared = None;
     let mut proposals = Vec::new();
     if let Some((unnamed, doubt)) = unnamed.as_ref().zip(doubt) {
         let (modelled, only_told) = loop {
-            let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
+            let known: Vec<ModelTerm> =
+                told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
             let (modelled, only_told) = unnamed.parts(search, &known);
             // Beside them too a name has to foretell something.
             let all = [known.as_slice(), &modelled].concat();
@@ -162,9 +163,9 @@ pub(super) fn report(
             let Some(i) = idle else { break (modelled, only_told) };
             told.remove(i);
             let kept: Vec<ModelTerm> = told.iter().map(|t| t.term.clone()).collect();
-            companions = shared::companions(narrow, library, &kept);
+            shared_effects = shared::effects(narrow, library, &kept);
         };
-        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
+        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
         let naming = unnamed.named(search, &known, modelled.clone());
         let found = naming.told.iter().map(|given| &given.term).chain(&naming.parts);
         let all: Vec<ModelTerm> = known.iter().chain(found).cloned().collect();
@@ -181,7 +182,7 @@ pub(super) fn report(
             told.extend(promoted(search, &others, &naming, k, &shares, (machine, library)));
         }
         told.sort_by(|a, b| b.finding.delta_bic.total_cmp(&a.finding.delta_bic));
-        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&companions).cloned().collect();
+        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
         let shown = [naming.parts.as_slice(), &only_told].concat();
         let all = [known.as_slice(), &shown].concat();
         // All together: what stands in the model was solved with all that stands there.
@@ -189,7 +190,7 @@ pub(super) fn report(
         let of_shown = described.split_off(known.len());
         let (told_terms, rest) = described.split_at(told.len());
         told.iter_mut().zip(told_terms).for_each(|(told, (_, named))| told.named = named.clone());
-        of_companions = Some(rest.iter().map(|(_, named)| named.clone()).collect::<Vec<Named>>());
+        of_shared = Some(rest.iter().map(|(_, named)| named.clone()).collect::<Vec<Named>>());
         let names = |term: &ModelTerm| naming.likely(&unnamed.group(term));
         let rank = |term: &ModelTerm| naming.rank(&unnamed.group(term));
         let mut shown_parts = Vec::new();
@@ -221,13 +222,13 @@ pub(super) fn report(
     let kept: Vec<ModelTerm> = told.iter().map(|told| told.term.clone()).collect();
     let placebos: Vec<Option<Placebo>> = told.iter_mut().map(|told| told.placebo.take()).collect();
     let left_over = residual_of(search, &[kept.as_slice(), &parts].concat());
-    let in_model = [kept.as_slice(), &companions, &parts].concat();
+    let in_model = [kept.as_slice(), &shared_effects, &parts].concat();
     let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
     let (findings, mut named): (Vec<Finding>, Vec<Named>) =
         told.into_iter().map(|told| (told.finding, told.named)).unzip();
-    let of_companions =
-        of_companions.unwrap_or_else(|| shared::named(search, (machine, library), &kept, &companions));
-    named.extend(of_companions);
+    let of_shared =
+        of_shared.unwrap_or_else(|| shared::named(search, (machine, library), &kept, &shared_effects));
+    named.extend(of_shared);
     named.extend(of_parts);
     let mut diagnosis = Diagnosis {
         machine: machine.name().into(),
@@ -243,13 +244,13 @@ pub(super) fn report(
         geometry_numbers: linear.fit.combinations.iter().filter(|c| c.share > 0.5).count() as u64,
         held_out_rms: ByQuantity::default(),
         set_ups_left_out,
-        shape_share: (!findings.is_empty()).then(|| shares.shapes / shares.total()),
+        shape_share: (!findings.is_empty()).then(|| shares.discrepancies / shares.total()),
         findings,
         unexplained,
         proposals,
-        companions: (companions.iter())
+        shared: (shared_effects.iter())
             .map(|effect| &search.candidates[effect.candidate])
-            .map(|c| Companion {
+            .map(|c| SharedEffect {
                 effect: c.effect.clone(),
                 at: c.place.name(machine),
                 of_set_up: library.families()[c.family].each_setup,
@@ -395,10 +396,10 @@ fn doubt(
         || left.beyond > CHANCE && (in_model.is_empty() || left.energy > TOLERATED * total)
         || left.beyond > CHANCE && search.in_motion && in_model.len() >= search.most()
         || in_model.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
-        || shares.is_misshapen(in_model.len())
+        || shares.is_discrepant(in_model.len())
         || search.in_motion && in_model.len() > 1 && folds::worsen(search, in_model, WORSE)
         || search.in_motion && !wanders && shares.is_unlike()
-        || shares.shapes > ODD_SHAPE * total
+        || shares.discrepancies > ODD_DISCREPANCY * total
             && surprise > CHANCE * left.overdispersion.max(1.0) * deviation
             && surprise > SURPRISE * memory * total;
     if is_unexplained {
@@ -443,10 +444,10 @@ fn finding(
         hypotheses.iter().filter(fit).map(|r| search.tempered(r, left.overdispersion)).collect();
     let own =
         hypotheses.iter().find(|r| r.candidate == effect.candidate).filter(|r| r.weight > TOLD).cloned()?;
-    let is_plain = search.commonness[own.candidate] == 0.0 && shares.shapes < PLAIN * total;
+    let is_plain = search.commonness[own.candidate] == 0.0 && shares.discrepancies < PLAIN * total;
     // A shape that is little beside all may be much beside this one.
-    let in_shape = shares.shapes < PLAIN * 2.0 * own.score.gain;
-    let hypotheses = if in_shape { hypotheses } else { levelled(search, &own, hypotheses) };
+    let in_discrepancy = shares.discrepancies < PLAIN * 2.0 * own.score.gain;
+    let hypotheses = if in_discrepancy { hypotheses } else { levelled(search, &own, hypotheses) };
     let odds = odds(search, &hypotheses, &own, left.overdispersion.max(search.overdispersion), is_plain);
     let own_odds =
         odds.iter().find(|o| o.hypothesis.candidate == own.candidate).map_or(0.0, |o| o.probability);
@@ -454,7 +455,7 @@ fn finding(
         o.probability >= ALIAS * own_odds || search.is_form(o.hypothesis.candidate, own.candidate)
     };
     let alike = odds.iter().filter(is_alike).map(|o| o.probability);
-    let probability = alike.sum::<f64>().min(1.0) * trust(shares.shapes / total, 2.0 * own.weight);
+    let probability = alike.sum::<f64>().min(1.0) * trust(shares.discrepancies / total, 2.0 * own.weight);
     let candidate = &search.candidates[effect.candidate];
     let family = &library.families()[candidate.family];
     let mut solved = model.effect(search, in_model, i, shares.departure());

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
 use super::folds;
-use super::lag::{self, late};
+use super::lag::{self, lagged};
 use super::linear::{Linear, linear};
 use super::noise::{self, Noise};
 use super::relinearised;
@@ -117,8 +117,8 @@ impl Case<'_> {
                 Told { diagnosis, may_be_late: lag::may_be_late(search, in_model) }
             };
             if moves < MOVES && !in_model.is_empty() {
-                if let Some(late) = late(&search, &in_model, plain) {
-                    (candidates, noise, moves) = (late, judged, moves + 1);
+                if let Some(lagged) = lagged(&search, &in_model, plain) {
+                    (candidates, noise, moves) = (lagged, judged, moves + 1);
                     coarse = Coarse::new(&linear, candidates.len());
                     continue;
                 }
@@ -152,9 +152,9 @@ impl Case<'_> {
                 let found = search.moved_together(found);
                 in_model = search.polished(&folds::useful(&search, &found));
                 if moves < MOVES
-                    && let Some(late) = late(&search, &in_model, plain)
+                    && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
-                    (candidates, moves) = (late, moves + 1);
+                    (candidates, moves) = (lagged, moves + 1);
                     coarse = Coarse::new(&linear, candidates.len());
                     continue;
                 }

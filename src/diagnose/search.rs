@@ -65,7 +65,8 @@ impl Search<'_> {
     /// The marginal beside all effects in the model but one.
     pub fn beside(&self, in_model: &[ModelTerm], but: Option<usize>) -> Marginal {
         let others = in_model.iter().enumerate().filter(|(i, _)| Some(*i) != but);
-        let parts: Vec<&DMatrix<f64>> = others.flat_map(|(_, e)| [&e.columns, &e.state, &e.shape]).collect();
+        let parts: Vec<&DMatrix<f64>> =
+            others.flat_map(|(_, e)| [&e.columns, &e.initial, &e.discrepancy]).collect();
         self.base.with(&side_by_side(&parts, self.rows.residual.len()))
     }
 
@@ -80,8 +81,8 @@ impl Search<'_> {
         if let Some(known) = before {
             return known;
         }
-        let is_misshapen = |others: &[ModelTerm]| self.shares(others).is_misshapen(others.len());
-        let ground = Arc::new(match hidden || !others.is_empty() && is_misshapen(&others) {
+        let is_discrepant = |others: &[ModelTerm]| self.shares(others).is_discrepant(others.len());
+        let ground = Arc::new(match hidden || !others.is_empty() && is_discrepant(&others) {
             true => self.beside_names(&others),
             false => self.beside(&others, None),
         });
@@ -93,14 +94,14 @@ impl Search<'_> {
 
     /// The marginal beside the names alone, as if their shapes were the families'.
     pub fn beside_names(&self, in_model: &[ModelTerm]) -> Marginal {
-        let parts: Vec<&DMatrix<f64>> = in_model.iter().flat_map(|e| [&e.columns, &e.state]).collect();
+        let parts: Vec<&DMatrix<f64>> = in_model.iter().flat_map(|e| [&e.columns, &e.initial]).collect();
         self.base.with(&side_by_side(&parts, self.rows.residual.len()))
     }
 
     /// Logarithm of the evidence of all effects in the model together, with what they were before and their shapes.
     pub fn worth(&self, in_model: &[ModelTerm]) -> f64 {
         let parts: Vec<&DMatrix<f64>> =
-            in_model.iter().flat_map(|e| [&e.columns, &e.state, &e.shape]).collect();
+            in_model.iter().flat_map(|e| [&e.columns, &e.initial, &e.discrepancy]).collect();
         let left = self.base.apply(&self.rows.residual);
         self.base.worth(&side_by_side(&parts, left.len()), &left, self.overdispersion)
     }

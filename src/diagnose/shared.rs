@@ -13,7 +13,7 @@ use crate::machine::Machine;
 
 /// Effects that hardly ever come alone, at all other places where they are more likely than not, beside those that are kept; each time the
 /// one with the greatest evidence.
-pub(super) fn companions(search: &Search, library: &Library, kept: &[ModelTerm]) -> Vec<ModelTerm> {
+pub(super) fn effects(search: &Search, library: &Library, kept: &[ModelTerm]) -> Vec<ModelTerm> {
     let of = |candidate: usize| &search.candidates[candidate];
     let comes_along = |candidate: usize| {
         let (own, family) = (of(candidate), &library.families()[of(candidate).family]);
@@ -62,9 +62,9 @@ pub(super) fn named(
     search: &Search,
     (machine, library): (&Machine, &Library),
     kept: &[ModelTerm],
-    companions: &[ModelTerm],
+    shared: &[ModelTerm],
 ) -> Vec<Named> {
-    let all = [kept, companions].concat();
+    let all = [kept, shared].concat();
     let model = Model::new(search, &all);
     let one = |(i, effect): (usize, &ModelTerm)| {
         let candidate = &search.candidates[effect.candidate];
@@ -73,5 +73,5 @@ pub(super) fn named(
         let sizes = identified.sizes(&search.rows.linear.samples);
         Named { effect: identified.stored(machine, &sizes), scales: effect.scales(search) }
     };
-    companions.iter().enumerate().map(one).collect()
+    shared.iter().enumerate().map(one).collect()
 }

@@ -11,23 +11,23 @@ use crate::effects::Place;
 use crate::feature::Feature;
 
 /// Part of an effect's energy by which its shape may depart from the family's, seen at its own place and anywhere else.
-const OWN_SHAPE: f64 = 0.004;
-const OTHER_SHAPE: f64 = 0.002;
+const OWN_DISCREPANCY: f64 = 0.004;
+const OTHER_DISCREPANCY: f64 = 0.002;
 /// The same of a train of waves along the travel, seen as another function of where its joint stands: gears mesh harder on one side.
 const SWELL: f64 = 0.02;
 /// So many periods are a train.
 const TRAIN: f64 = 6.0;
 /// A tone is heard in the edges of every other shape, and one course over time in another.
-const CLOCK_SHAPE: f64 = 0.01;
+const CLOCK_DISCREPANCY: f64 = 0.01;
 /// A second line of the same family at the same place takes away at least this part of what the first does.
 const REPEATED: f64 = 0.15;
 /// What takes away this part of what shapes take up and leave beside a curve is no shape of it.
 const ALL: f64 = 0.9;
 /// The shapes of what was found may make up this part of all; less, by a root, the more names share it.
-const SHAPE: f64 = 0.35;
+const DISCREPANCY: f64 = 0.35;
 
 /// Where nothing tells how far they depart, they are expected to by this part of what the search allows them.
-const UNKNOWN_SHAPE: f64 = 0.04;
+const UNKNOWN_DISCREPANCY: f64 = 0.04;
 /// Median of what is normal with mean zero and may not be negative, in standard deviations.
 const MEDIAN: f64 = 0.674;
 
@@ -51,7 +51,7 @@ pub(super) struct Shares {
     /// With the effects as their families say.
     pub names: f64,
     /// With the freedom of their shapes.
-    pub shapes: f64,
+    pub discrepancies: f64,
     /// With nothing.
     pub left: Leftover,
     /// What of the shapes is the course of a drift that may take any.
@@ -63,26 +63,28 @@ pub(super) struct Shares {
 impl Shares {
     /// All of it that stands out from noise.
     pub fn total(&self) -> f64 {
-        (self.names + self.shapes + self.left.energy).max(1e-300)
+        (self.names + self.discrepancies + self.left.energy).max(1e-300)
     }
 
     /// Part of what shapes may depart from the families' by which they do: what they seem to, or what chance hides of it as likely as not.
     pub fn departure(&self) -> f64 {
         let hidden = MEDIAN * self.left.overdispersion * (2.0 * self.freedom).sqrt();
-        (self.shapes / self.total()).sqrt().max((hidden / self.total()).sqrt().min(UNKNOWN_SHAPE))
+        (self.discrepancies / self.total())
+            .sqrt()
+            .max((hidden / self.total()).sqrt().min(UNKNOWN_DISCREPANCY))
     }
 
     /// Whether the shapes depart so far from the families' that the names are wrong.
-    pub fn is_misshapen(&self, effects: usize) -> bool {
+    pub fn is_discrepant(&self, effects: usize) -> bool {
         let several = effects.max(2) - 1;
-        self.shapes > SHAPE * self.total() / (several as f64).sqrt()
+        self.discrepancies > DISCREPANCY * self.total() / (several as f64).sqrt()
     }
 
     /// Whether the shapes depart farther from the families' than those of a right name do. No law says what course an instrument's drift
     /// takes, but it is smooth: its shape leaves next to nothing.
     pub fn is_unlike(&self) -> bool {
         let free = if self.left.energy < JUMPS * self.total() { self.free } else { 0.0 };
-        self.shapes - free
+        self.discrepancies - free
             > UNLIKE * self.total() + CHANCE * self.left.overdispersion * (2.0 * self.freedom).sqrt()
     }
 }
@@ -97,14 +99,14 @@ impl Search<'_> {
         };
         let drifts =
             in_model.iter().filter(|effect| discrepancy::is_drift(&self.candidates[effect.candidate]));
-        let courses: Vec<&DMatrix<f64>> = drifts.map(|effect| &effect.shape).collect();
+        let courses: Vec<&DMatrix<f64>> = drifts.map(|effect| &effect.discrepancy).collect();
         let free = match courses.is_empty() {
             true => 0.0,
             false => taken(&names, &names.with(&side_by_side(&courses, self.rows.residual.len()))),
         };
         Shares {
             names: taken(&self.base, &names),
-            shapes: taken(&names, &full),
+            discrepancies: taken(&names, &full),
             free,
             left: self.leftover(&full),
             freedom: full.parameters() - names.parameters(),
@@ -180,7 +182,7 @@ impl Search<'_> {
         };
         let is_all = || {
             let shares = self.shares(in_model);
-            2.0 * hypothesis.score.gain > ALL * (shares.shapes + shares.left.energy)
+            2.0 * hypothesis.score.gain > ALL * (shares.discrepancies + shares.left.energy)
         };
         let mut small = in_model.iter().filter(|a| hypothesis.score.gain < REPEATED * a.score.gain);
         small.any(|a| is_alike(a) || is_of_curve(a) && !(self.in_motion && is_all()))
@@ -193,14 +195,15 @@ impl Search<'_> {
 
     /// Whether it may be the course over time of what was found: of two courses the smaller one is the other one's shape.
     pub fn is_of_course(&self, hypothesis: &Hypothesis, in_model: &[ModelTerm]) -> bool {
-        let is_course =
-            |a: &ModelTerm| self.goes_by_clock(a.candidate) && hypothesis.score.gain < SHAPE * a.score.gain;
+        let is_course = |a: &ModelTerm| {
+            self.goes_by_clock(a.candidate) && hypothesis.score.gain < DISCREPANCY * a.score.gain
+        };
         self.goes_by_clock(hypothesis.candidate) && in_model.iter().any(is_course)
     }
 
     /// Whether an effect is a wave of a whole order, which comes back with every turn, and the hypothesis depends on where the same joint stands
     /// and does not, or has fewer waves a turn: then it is no shape of that wave.
-    fn is_no_shape(&self, hypothesis: &Hypothesis, effect: &ModelTerm) -> bool {
+    fn is_no_discrepancy(&self, hypothesis: &Hypothesis, effect: &ModelTerm) -> bool {
         let order =
             |candidate: usize, at: &[f64]| discrepancy::order(self.rows, &self.candidates[candidate], at);
         let place = |candidate: usize| self.candidates[candidate].place;
@@ -223,23 +226,23 @@ impl Search<'_> {
 
     /// Half the energy that what was found may leave over because its shape departs from the family's: more at the same place and where
     /// both go by the clock.
-    pub fn shape_error(&self, hypothesis: &Hypothesis, in_model: &[ModelTerm]) -> f64 {
+    pub fn discrepancy_error(&self, hypothesis: &Hypothesis, in_model: &[ModelTerm]) -> f64 {
         let place = |candidate: usize| self.candidates[candidate].place.dyad();
         let timed = |candidate: usize| self.goes_by_clock(candidate);
         let share = |effect: &ModelTerm| {
             let is_here = place(effect.candidate) == place(hypothesis.candidate);
             if is_here && self.is_swell(hypothesis, effect) {
                 SWELL
-            } else if self.is_no_shape(hypothesis, effect) {
+            } else if self.is_no_discrepancy(hypothesis, effect) {
                 0.0
             } else if is_here {
-                OWN_SHAPE
+                OWN_DISCREPANCY
             } else if self.is_tone(hypothesis.candidate)
                 || timed(effect.candidate) && timed(hypothesis.candidate)
             {
-                CLOCK_SHAPE
+                CLOCK_DISCREPANCY
             } else {
-                OTHER_SHAPE
+                OTHER_DISCREPANCY
             }
         };
         in_model.iter().map(|effect| share(effect) * effect.score.gain).sum()

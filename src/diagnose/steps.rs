@@ -78,11 +78,11 @@ impl Search<'_> {
     /// The effect to be taken in next: what stands out beside those found, else what was taken for their shape.
     fn next(&self, in_model: &[ModelTerm]) -> Option<ModelTerm> {
         let shares = self.shares(in_model);
-        if shares.is_misshapen(in_model.len()) {
+        if shares.is_discrepant(in_model.len()) {
             return self.hidden(in_model, &self.hypotheses(in_model), &shares);
         }
         self.beyond(in_model).or_else(|| {
-            let is_odd = shares.shapes > ODD * shares.total();
+            let is_odd = shares.discrepancies > ODD * shares.total();
             let ground = || Arc::new(self.beside_names(in_model));
             is_odd.then(|| self.hidden(in_model, &self.compare(ground(), None), &shares)).flatten()
         })
@@ -94,7 +94,7 @@ impl Search<'_> {
         let before = self.leftover(&marginal);
         let best = self.best(&hypotheses, in_model, &before)?;
         let least = if self.in_motion { WORTH } else { WORTH_SETTLED } * before.energy;
-        if best.score.gain < self.shape_error(best, in_model) || 2.0 * best.score.gain < least {
+        if best.score.gain < self.discrepancy_error(best, in_model) || 2.0 * best.score.gain < least {
             return None;
         }
         self.entered(best, &hypotheses, &marginal)
@@ -109,8 +109,9 @@ impl Search<'_> {
     ) -> Option<ModelTerm> {
         let marginal = Arc::new(self.beside_names(in_model));
         let best = self.best(hypotheses, in_model, &self.leftover(&marginal))?;
-        let is_most = 2.0 * best.score.gain >= HIDDEN * shares.shapes;
-        let is_own = best.score.gain < self.shape_error(best, in_model) || self.is_of_course(best, in_model);
+        let is_most = 2.0 * best.score.gain >= HIDDEN * shares.discrepancies;
+        let is_own =
+            best.score.gain < self.discrepancy_error(best, in_model) || self.is_of_course(best, in_model);
         let entered = (is_most && !is_own).then(|| self.entered(best, hypotheses, &marginal)).flatten();
         entered.map(|effect| ModelTerm { hidden: true, ..effect })
     }
@@ -137,7 +138,8 @@ impl Search<'_> {
     ) -> Option<ModelTerm> {
         let near = hypotheses.iter().take(NEAR).map(|r| r.candidate).collect();
         let entered = ModelTerm { near, ..self.settle(best, marginal)? };
-        let left = self.leftover(&marginal.with(&entered.columns).with(&entered.state).with(&entered.shape));
+        let left =
+            self.leftover(&marginal.with(&entered.columns).with(&entered.initial).with(&entered.discrepancy));
         (best.weight >= ENTER * (left.overdispersion / self.overdispersion).max(1.0)).then_some(entered)
     }
 

@@ -15,9 +15,9 @@ pub(super) struct ModelTerm {
     /// Its coefficients, in units of the columns.
     pub solution: DVector<f64>,
     /// Whitened columns of what it may have been before anybody looked.
-    pub state: DMatrix<f64>,
+    pub initial: DMatrix<f64>,
     /// Whitened columns by which its shape may depart from the family's.
-    pub shape: DMatrix<f64>,
+    pub discrepancy: DMatrix<f64>,
     /// Candidates that might take its place.
     pub near: Vec<usize>,
     /// Whether it had been taken for the shape of the others, and so is judged beside their names alone.
@@ -31,8 +31,8 @@ impl ModelTerm {
     }
 
     /// With a shape that is quite the family's.
-    pub(super) fn without_shape(&self) -> ModelTerm {
-        ModelTerm { shape: DMatrix::zeros(self.columns.nrows(), 0), ..self.clone() }
+    pub(super) fn without_discrepancy(&self) -> ModelTerm {
+        ModelTerm { discrepancy: DMatrix::zeros(self.columns.nrows(), 0), ..self.clone() }
     }
 
     /// In the place of another.

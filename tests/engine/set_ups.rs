@@ -142,15 +142,15 @@ fn zeros_of_one_axis_that_come_anew_bring_those_of_the_others_into_the_model() {
     let mut said = said(&machine, known);
     let joint = |i: usize| machine.commands()[i].clone();
     assert_eq!(names(&said), [("homing_error", joint(1).as_str())]);
-    let companions = said.companions.clone();
+    let shared = said.shared.clone();
     let comes_along =
-        |at: String| companions.iter().any(|c| c.effect == "homing_error" && c.at == at && c.of_set_up);
-    assert!(comes_along(joint(2)) && !comes_along(joint(1)), "{companions:?}");
+        |at: String| shared.iter().any(|c| c.effect == "homing_error" && c.at == at && c.of_set_up);
+    assert!(comes_along(joint(2)) && !comes_along(joint(1)), "{shared:?}");
 
     // The file has them, and a new set-up finds all of them again.
     let model =
         said.model(&machine, known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
-    assert_eq!(model.effects().len(), 1 + companions.len());
+    assert_eq!(model.effects().len(), 1 + shared.len());
     let found = fit_setup(&model, new, Loss::Squares).unwrap_or_else(|e| panic!("{e}"));
     let rms = predict(&found, &new[0], None).unwrap_or_else(|e| panic!("{e}")).rms.m;
     // 20 um in each of three directions.

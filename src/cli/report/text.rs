@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::diagnose::{
-    Companion, Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, SaidBy,
+    Diagnosis, Finding, HeldOutPair, HeldOutRms, LeftOutRms, Meaningless, RmsByModel, SaidBy, SharedEffect,
     StandsStill, Thinned, Unexplained, UnnamedPart, UnseenSideBranch, Where,
 };
 use crate::effects::in_words;
@@ -29,7 +29,7 @@ pub(super) fn not_tried(diagnosis: &Diagnosis) -> Vec<String> {
 /// What the model has beside the findings, a line each: joints that have an effect of theirs too, and sides of approach.
 pub(super) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
     let mut by_effect: Vec<(&str, bool, Vec<&str>)> = Vec::new();
-    for Companion { effect, at, of_set_up } in &diagnosis.companions {
+    for SharedEffect { effect, at, of_set_up } in &diagnosis.shared {
         match by_effect.iter_mut().find(|(known, ..)| known == effect) {
             Some((.., places)) => places.push(at),
             None => by_effect.push((effect, *of_set_up, vec![at])),
