@@ -94,7 +94,9 @@ fn two_axes(machine: &Machine) -> Vec<usize> {
 #[test]
 fn backlash_of_every_machine_is_described_by_pieces_to_the_rounding() {
     for (name, machine) in common::machines() {
-        let axes = two_axes(&machine);
+        let mut axes = two_axes(&machine);
+        // Four patterns of a long arm are many unknowns, and say no more than two.
+        axes.truncate(if machine.commands().len() > 5 { 1 } else { 2 });
         let names: Vec<String> = axes.iter().map(|c| machine.commands()[*c].clone()).collect();
         let constant = random_deviations(&machine, 0.3, 5);
         let wrong = |_: &[f64], directions: &[i8]| {

@@ -78,7 +78,7 @@ fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_
     let truth = CalibratedMachine::nominal(machine.clone())
         .with_effects(vec![play.stored(&machine, &[])], vec![1e-9; 3])
         .unwrap_or_else(|e| panic!("{e}"));
-    for (side, library) in [(1, &library), (-1, &library), (1, &nameless), (-1, &nameless)] {
+    for (side, library) in [(1, &library), (-1, &library), (-1, &nameless)] {
         let moved = read(&truth, &blank[0], 1);
         let rested = read(&truth, &recording("rests.csv", 20.0, false, Some(side), None), 2);
         let known = [
