@@ -283,15 +283,12 @@ fn grams(
 /// Settled positions are few, and where none is repeated nothing tells their noise: there every effect has to prove itself.
 pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> {
     let mut kept = in_model.to_vec();
-    let is_harm = |(gain, error): &(f64, f64)| if search.in_motion { *gain < -error } else { *gain < 0.0 };
     while let Some(folds) = Folds::new(search, &kept) {
-        let each = (0..kept.len()).map(|i| (i, folds.gain(search, i)));
-        let worse = each.filter(|(_, gain)| is_harm(gain));
-        match worse.min_by(|(_, (a, _)), (_, (b, _))| a.total_cmp(b)) {
-            Some((worst, _)) => drop(kept.remove(worst)),
+        match folds.worst(search, kept.len()) {
+            Some(worst) => drop(kept.remove(worst)),
             None => {
                 let (alone, all) = (folds.left_out(search, &|_| false), folds.left_out(search, &|_| true));
-                if is_harm(&folds.fall(search, &alone, &all)) {
+                if is_harm(search, folds.fall(search, &alone, &all)) {
                     kept.clear();
                 }
                 break;
@@ -299,6 +296,15 @@ pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> 
         }
     }
     kept
+}
+
+/// Of the first `names` of these effects, the one without which left-out stretches are foretold best, if that is better than with it, as above.
+pub(super) fn worst(search: &Search, in_model: &[ModelTerm], names: usize) -> Option<usize> {
+    Folds::new(search, in_model)?.worst(search, names)
+}
+
+fn is_harm(search: &Search, (gain, error): (f64, f64)) -> bool {
+    if search.in_motion { gain < -error } else { gain < 0.0 }
 }
 
 /// Whether effects make the mean square of stretches that were left out so many times that of geometry alone.
@@ -374,6 +380,13 @@ impl Folds {
     /// By how much the squares of what is left out fall with effect `i`, in units of their mean without it, and the standard error of that.
     fn gain(&self, search: &Search, i: usize) -> (f64, f64) {
         self.fall(search, &self.left_out(search, &|effect| effect != i), &self.left_out(search, &|_| true))
+    }
+
+    /// Of the first `names` effects the one that does the greatest harm, if one does.
+    fn worst(&self, search: &Search, names: usize) -> Option<usize> {
+        let each = (0..names).map(|i| (i, self.gain(search, i)));
+        let worse = each.filter(|(_, gain)| is_harm(search, *gain));
+        worse.min_by(|(_, (a, _)), (_, (b, _))| a.total_cmp(b)).map(|(i, _)| i)
     }
 
     /// The same over those folds alone where it would be so if the model were right; `None` where there is none.

@@ -38,10 +38,10 @@ fn standard_errors(search: &Search, all: &[ModelTerm], i: usize) -> f64 {
     folds::gain_elsewhere(search, all, i).map_or(own, by).min(own)
 }
 
-/// Of the first `names` of these terms that do not foretell so, the one that does so least.
-pub(super) fn least_foretold(search: &Search, all: &[ModelTerm], names: usize) -> Option<usize> {
-    let each: Vec<f64> = (0..names).map(|i| standard_errors(search, all, i)).collect();
-    (0..names).filter(|i| each[*i] <= 1.0).min_by(|a, b| each[*a].total_cmp(&each[*b]))
+/// Of the terms that are not foretold so, the one that is so least.
+pub(super) fn least_foretold(search: &Search, all: &[ModelTerm]) -> Option<usize> {
+    let each: Vec<f64> = (0..all.len()).map(|i| standard_errors(search, all, i)).collect();
+    (0..all.len()).filter(|i| each[*i] <= 1.0).min_by(|a, b| each[*a].total_cmp(&each[*b]))
 }
 
 /// Free functions as candidates, beside the families of a search: what is no name for all that is there may be one for a part of it.

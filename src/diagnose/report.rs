@@ -43,8 +43,8 @@ const TOLERATED: f64 = 0.2;
 /// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
 /// leaves fewer independent readings.
 const SURPRISE: f64 = 0.003;
-/// What is modelled without a name leaves no more than this part of the squares of left-out stretches beyond the noise's. Where it foretells less, the law is
-/// another one, and where that does nothing, what was taken for it would do harm.
+/// What is modelled without a name leaves no more than this part of the squares of left-out stretches beyond the noise's. Where it foretells
+/// less, the law is another one, and where that does nothing, what was taken for it would do harm.
 const HALF: f64 = 0.5;
 /// Several names that make the mean square of stretches left out so many times that of geometry alone are a patchwork.
 const WORSE: f64 = 2.0;
@@ -153,24 +153,25 @@ pub(super) fn report(
     let mut of_shared = None;
     let mut proposals = Vec::new();
     if let Some((unnamed, doubt)) = unnamed.as_ref().zip(doubt) {
-        let (modelled, only_told) = loop {
-            let known: Vec<ModelTerm> =
-                told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
-            let (modelled, only_told) = unnamed.parts(search, &known);
-            // Beside them too a name has to foretell something.
-            let all = [known.as_slice(), &modelled].concat();
-            let idle = (!modelled.is_empty()).then(|| least_foretold(search, &all, told.len())).flatten();
-            let Some(i) = idle else { break (modelled, only_told) };
+        let mut known: Vec<ModelTerm> =
+            told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
+        let (modelled, only_told) = unnamed.parts(search, &known);
+        let naming = unnamed.named(search, &known, modelled.clone());
+        let found: Vec<ModelTerm> =
+            naming.told.iter().map(|given| &given.term).chain(&naming.parts).cloned().collect();
+        let all = [known.as_slice(), &found].concat();
+        let is_modelled = !modelled.is_empty()
+            && folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF);
+        // What helped alone may do harm beside them.
+        while let Some(i) = is_modelled
+            .then(|| folds::worst(search, &[known.as_slice(), &found].concat(), told.len()))
+            .flatten()
+        {
             told.remove(i);
             let kept: Vec<ModelTerm> = told.iter().map(|t| t.term.clone()).collect();
             shared_effects = shared::effects(narrow, library, &kept);
-        };
-        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
-        let naming = unnamed.named(search, &known, modelled.clone());
-        let found = naming.told.iter().map(|given| &given.term).chain(&naming.parts);
-        let all: Vec<ModelTerm> = known.iter().chain(found).cloned().collect();
-        let is_modelled = !modelled.is_empty()
-            && folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF);
+            known = [kept.as_slice(), &shared_effects].concat();
+        }
         let (naming, only_told) = match is_modelled {
             true => (naming, Vec::new()),
             false if is_rest => (naming.withdrawn(), Vec::new()),
@@ -324,7 +325,7 @@ fn proved(
         is_outdone(&placebo(search, names, i, machine)) || says_no_more(search, names, i)
     };
     let worst = |names: &[ModelTerm]| {
-        least_foretold(search, names, names.len()).or_else(|| (0..names.len()).find(|i| is_empty(names, *i)))
+        least_foretold(search, names).or_else(|| (0..names.len()).find(|i| is_empty(names, *i)))
     };
     while let Some(i) = worst(&names) {
         names.remove(i);
