@@ -104,6 +104,14 @@ impl Diagnosis {
         !self.findings.is_empty() || parts.into_iter().any(|part| part.modelled)
     }
 
+    /// Whether its model foretells left-out stretches better than that of another one.
+    pub(super) fn foretells_more(&self, other: &Diagnosis) -> bool {
+        let left = |diagnosis: &Diagnosis| -> f64 {
+            diagnosis.held_out_rms.there().map(|(_, rms)| rms.r#final.ln()).sum()
+        };
+        left(self) < left(other)
+    }
+
     /// The text of a file of effects with all families that are proposed, for
     /// [`Library::with_file`](crate::effects::Library::with_file); `None` where there are none.
     pub fn proposed_library(&self) -> Option<String> {

@@ -176,7 +176,13 @@ fn whitened(rows: &Rows, answers: Vec<Vec<f64>>, curves: Vec<Vec<f64>>, amplitud
                 *plain = answer * curve[*sample];
             }
             rows.whitener.apply(plain, white);
-            let length = white.iter().map(|x| x * x).sum::<f64>().sqrt();
+            // Rows that are left out have their part in how long it may be.
+            let squares = |all: bool| -> f64 {
+                let used = plain.iter().zip(&rows.whitener.out).filter(|(_, out)| all || !**out);
+                used.map(|(x, _)| x * x).sum()
+            };
+            let seen = squares(false) / squares(true);
+            let length = (white.iter().map(|x| x * x).sum::<f64>() / seen).sqrt();
             *scale = if length > 0.0 && length.is_finite() { amplitude / length } else { 0.0 };
             white.iter_mut().for_each(|x| *x *= *scale);
         },

@@ -106,6 +106,18 @@ impl Search<'_> {
         })
     }
 
+    /// An effect as it stands, whitened by the noise of this search.
+    pub fn anew(&self, effect: &ModelTerm) -> ModelTerm {
+        let Some(mut columns) = effect.raw(self) else { return effect.clone() };
+        self.rows.whiten(&mut columns);
+        let (gram, toward) = self.normal(&columns, &self.base);
+        let solution = solved(gram, &toward).unwrap_or_else(|| effect.solution.clone());
+        let mut anew = ModelTerm { columns, solution, ..effect.clone() };
+        anew.initial = self.initial_of(&anew);
+        anew.discrepancy = discrepancy::columns(self.rows, &self.candidates[effect.candidate], &anew);
+        anew
+    }
+
     /// Columns of what an effect was before anybody looked.
     pub fn initial_of(&self, effect: &ModelTerm) -> DMatrix<f64> {
         self.initial_conditions_of(effect)

@@ -10,11 +10,13 @@ use super::diagnosis::Named;
 use super::folds;
 use super::held_out::Model;
 use super::nameless::UnnamedPart;
+use super::noise::Noise;
 use super::rms::rms_of;
 use super::score::Rows;
 use super::search::{ENTER, Search};
 use super::shares::Shares;
 use super::terms::{ModelTerm, all_but};
+use super::whitener::Whitener;
 use crate::effects::{Candidate, Library, Place, RecordingFacts};
 use crate::feature::Dependence;
 use crate::machine::Machine;
@@ -73,9 +75,16 @@ impl Unnamed {
         a.directions == b.directions && a.pivot == b.pivot
     }
 
-    /// The rows of a search, for these candidates.
-    pub fn rows<'a>(&'a self, search: &Search<'a>) -> Rows<'a> {
-        Rows::new(search.rows.linear, &self.coarse, search.rows.whitener.clone())
+    /// The rows of a search, for these candidates, beside its own noise or another.
+    pub fn rows<'a>(&'a self, search: &Search<'a>, noise: Option<&[Noise]>) -> Rows<'a> {
+        let whitener = &search.rows.whitener;
+        let whitener = match noise {
+            Some(noise) => {
+                Whitener::new(search.rows.residual.len(), search.runs, noise, whitener.out.clone())
+            }
+            None => whitener.clone(),
+        };
+        Rows::new(search.rows.linear, &self.coarse, whitener)
     }
 
     /// The search with these candidates.
@@ -86,7 +95,7 @@ impl Unnamed {
         Search {
             rows,
             runs: search.runs,
-            base: search.base.clone(),
+            base: rows.constant(),
             candidates: &self.candidates,
             priors: self.candidates.iter().map(|c| (c.often / total).ln()).collect(),
             commonness,

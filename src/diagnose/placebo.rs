@@ -9,6 +9,7 @@ use crate::effects::{Candidate, Place};
 use crate::machine::Machine;
 
 /// An effect with as many numbers, where it was found, and a meaningless cause.
+#[derive(Clone)]
 pub(super) struct Placebo {
     /// What drives it, as part of a sentence.
     pub cause: String,

@@ -33,7 +33,7 @@ pub(super) fn proposals(
     (machine, library, facts): (&Machine, &Library, &RecordingFacts),
 ) -> Vec<Proposal> {
     let laws = Unnamed::of(Library::primitives(), search, machine, facts);
-    let rows = laws.rows(search);
+    let rows = laws.rows(search, None);
     let search = &laws.search(search, &rows);
     let draft = Draft { search, unnamed, laws: &laws, machine };
     let dyad = |term: &ModelTerm| search.candidates[term.candidate].place.dyad();

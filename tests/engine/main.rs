@@ -32,6 +32,7 @@ mod rivals;
 mod set_ups;
 mod shown_by_one;
 mod side_branches;
+mod smooth_misfit;
 mod standing_still;
 mod table;
 mod told_as_one;
