@@ -9,6 +9,7 @@
 mod bag;
 mod cdr;
 mod container;
+mod definition;
 mod frames;
 mod idl;
 mod message;

@@ -30,6 +30,8 @@ use crate::wording::{count, shown};
 pub(super) const MAGIC: &[u8] = rosbag::MAGIC;
 /// The longest gap over which a line is drawn is so many usual intervals, where nobody tells it.
 const GAP: i64 = 3;
+/// Stamps above this, ns, count from 1970, and not from the start of a simulation.
+const SINCE_1970: i64 = 970_000_000_000_000_000;
 /// A bend that is told, rad or m: what is below is rounding.
 const LEAST_BEND: f64 = 1e-9;
 /// Columns before those of joints: `t px py pz qw qx qy qz`.
@@ -44,6 +46,8 @@ pub(super) struct Bagged {
     stamps: Vec<i64>,
     joints: Joints,
     topic: String,
+    /// Where `t` is 0, if nobody has told it.
+    zero: Option<String>,
     told: Vec<String>,
 }
 
@@ -95,6 +99,7 @@ pub(super) fn read(
         stamps: poses.iter().map(|(at, _)| *at).collect(),
         joints: joints.clone(),
         topic: topic.name.clone(),
+        zero: None,
         told,
     };
     let gaps: Vec<i64> = (0..joints.names.len()).map(|k| bagged.gap(k)).collect();
@@ -120,6 +125,12 @@ impl Bagged {
             if !request.columns.iter().any(|(to, _)| to == name) {
                 request.columns.push((name.into(), format!("#{}", k + 1)));
             }
+        }
+        // The first pose may be dropped: its stamp is the zero all the same.
+        let first = self.stamps.first().filter(|at| **at > SINCE_1970);
+        if let Some(first) = first.filter(|_| request.time_zero.is_none() && request.map.is_none()) {
+            request.time_zero = Some(seconds(*first));
+            self.zero = Some(seconds(*first));
         }
         // Those that were told come before.
         for (kind, unit) in [("length", "m"), ("angle", "rad"), ("time", "s")] {
@@ -227,6 +238,9 @@ impl Bagged {
             told.push(format!("{} dropped {why}", count(count_of, "pose", "poses")));
         }
         told.push("joint states say where joints were read to be, not what was commanded: a lag of the drives does not show".into());
+        told.extend(self.zero.iter().map(|zero| {
+            format!("t is 0 at {zero}, the stamp of the first pose; where several files share one clock, give all the same `--time-zero`")
+        }));
         Ok(told)
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::schema::{Definition, Field, plain};
+use super::definition::{Definition, Field, plain};
 
 /// A word, a number, a sign or a text in quotes, with its line.
 type Token = (String, usize);

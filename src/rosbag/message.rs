@@ -15,7 +15,7 @@ pub(super) enum Kind {
 impl Kind {
     /// By the name of the type, `package/msg/Type` or `package/Type`.
     pub fn named(name: &str) -> Option<Kind> {
-        Some(match super::schema::plain(name).as_str() {
+        Some(match super::definition::plain(name).as_str() {
             "sensor_msgs/JointState" => Kind::JointState,
             "geometry_msgs/PoseStamped" => Kind::Pose,
             "geometry_msgs/TransformStamped" => Kind::Transform,

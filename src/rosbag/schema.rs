@@ -5,25 +5,8 @@
 
 use std::collections::BTreeMap;
 
+use super::definition::{Definition, Field, plain};
 use super::{Fault, idl};
-
-/// A structure: its fields in their order.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Definition {
-    /// `package/Type`.
-    pub name: String,
-    /// Where it begins in the text.
-    pub line: usize,
-    pub fields: Vec<Field>,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Field {
-    /// `float64`, `string[]`, `float64[36]`, `package/Type`; bounded lists and texts are written as those without a bound.
-    pub kind: String,
-    pub name: String,
-    pub line: usize,
-}
 
 /// What is read, in the language of `.msg` files.
 const READ: &str = "MSG: builtin_interfaces/Time
@@ -169,11 +152,6 @@ type Named = BTreeMap<String, Definition>;
 
 fn by_name(all: Vec<Definition>) -> Named {
     all.into_iter().map(|definition| (definition.name.clone(), definition)).collect()
-}
-
-/// `package/Type` of `package/msg/Type` and `package::msg::Type`.
-pub(super) fn plain(name: &str) -> String {
-    name.replace("::", "/").replace("/msg/", "/")
 }
 
 /// Definitions of a text of `.msg` files: the first bears the name of the schema, the others their own, behind lines of `=`.
