@@ -87,6 +87,9 @@ pub(crate) struct Args {
     /// What deviations are: of a laser or at targets the first two, of an R-test the others
     #[arg(long, value_name = "SENSE", value_parser = ["laser-minus-target", "target-minus-laser", "ball-minus-tool", "tool-minus-ball"])]
     deviation: Option<String>,
+    /// Along which axes an R-test was read: of the tool, in which the nest stands, of the machine's base, or of the workpiece
+    #[arg(long, value_name = "AXES", value_parser = ["tool", "machine", "workpiece"])]
+    axes: Option<String>,
     /// What separates columns: comma, semicolon, tab or blanks; found by itself
     #[arg(long, value_name = "WORD", conflicts_with = "map")]
     separator: Option<String>,
@@ -158,6 +161,7 @@ impl Args {
             joint: self.joint.clone(),
             approach: self.approach.clone(),
             deviation: self.deviation.clone(),
+            axes: self.axes.clone(),
             separator: self.separator.clone(),
             decimal: self.decimal.clone(),
             joint_topic: self.joint_topic.clone(),

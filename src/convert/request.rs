@@ -39,6 +39,8 @@ pub struct Request {
     pub approach: Option<String>,
     /// What deviations are: of a laser `laser-minus-target` or `target-minus-laser`, of an R-test `ball-minus-tool` or `tool-minus-ball`.
     pub deviation: Option<String>,
+    /// Along which axes the deviations of an R-test were read: `tool`, `machine` or `workpiece`.
+    pub axes: Option<String>,
     /// What separates columns: `comma`, `semicolon`, `tab`, `blanks`.
     pub separator: Option<String>,
     /// `point` or `comma`.
@@ -163,6 +165,13 @@ impl Request {
     #[must_use]
     pub fn with_deviation(mut self, deviation: impl Into<String>) -> Self {
         self.deviation = Some(deviation.into());
+        self
+    }
+
+    /// With deviations of an R-test along the axes of the `tool`, the `machine` or the `workpiece`.
+    #[must_use]
+    pub fn with_axes(mut self, axes: impl Into<String>) -> Self {
+        self.axes = Some(axes.into());
         self
     }
 
