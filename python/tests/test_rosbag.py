@@ -42,7 +42,7 @@ def test_what_is_at_fault_is_told_with_the_mend(command: CommandLine, name: str)
     assert not (command.folder / "none.csv").exists()
 
 
-def way(s: "np.typing.NDArray[np.float64]") -> "list[np.typing.NDArray[np.float64]]":
+def way(s: Any) -> list[Any]:
     """Joints of the arm, rad and m, after so many seconds."""
     return [0.9 * np.sin(0.8 * s), 1.1 * np.sin(0.5 * s + 1), 0.1 + 0.06 * np.cos(0.7 * s), 1.5 * np.sin(0.3 * s)]
 
@@ -57,18 +57,15 @@ def test_an_arm_in_a_bag_is_calibrated_as_from_its_recording(command: CommandLin
     (command.folder / "way.csv").write_text("\n".join([names, *rows]) + "\n")
     test = ["--test", "path", "--input", "way.csv", "--measure", "pose", "--noise", "10um", "--noise-angle", "20urad", "--random", "3"]
     command.json("simulate", scara, *test, "-o", "seen.csv")
-    seen, head = columns_of(command.folder / "seen.csv")
+    seen, _ = columns_of(command.folder / "seen.csv")
 
-    def column(name: str) -> "np.typing.NDArray[np.float64]":
+    def column(name: str) -> Any:
         key = next(key for key in seen if key.split("[")[0] == name)
         return seen[key] * {"mm": 1e-3, "deg": np.pi / 180}.get(key.split("[")[1].rstrip("]"), 1.0)
 
-    if "qw[1]" in seen:
-        turns = [column(name) for name in ("qx", "qy", "qz", "qw")]
-    else:
-        turn = np.column_stack([column(name) for name in ("rx", "ry", "rz")])
-        angle = np.linalg.norm(turn, axis=1)
-        turns = [*(turn * (np.sinc(angle / 2 / np.pi) / 2)[:, None]).T, np.cos(angle / 2)]
+    turn = np.column_stack([column(name) for name in ("rx", "ry", "rz")])
+    half = np.linalg.norm(turn, axis=1) / 2
+    turns = [*(turn * (np.sinc(half / np.pi) / 2)[:, None]).T, np.cos(half)]
 
     def stamp(at: float) -> dict[str, int]:
         ns = ZERO + round(at * 1e9)

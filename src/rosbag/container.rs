@@ -241,7 +241,7 @@ fn chunk(body: &[u8], at: u64, take: &mut Take) -> Result<(), Fault> {
 }
 
 /// What a chunk holds: no more than it claims, so that a few bytes do not fill the memory.
-fn unpack<'a>(decoder: impl Read, size: u64, at: u64, bytes: &'a mut Vec<u8>) -> Result<&'a [u8], Fault> {
+fn unpack(decoder: impl Read, size: u64, at: u64, bytes: &mut Vec<u8>) -> Result<&[u8], Fault> {
     let read = decoder.take(size + 1).read_to_end(bytes);
     read.map_err(|error| damaged(at, &format!("a chunk cannot be decompressed: {error}")))?;
     Ok(bytes)

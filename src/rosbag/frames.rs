@@ -87,7 +87,8 @@ impl Frames {
             if a.child != b.child {
                 break;
             }
-            (up.pop(), down.pop());
+            up.pop();
+            down.pop();
         }
         let top = |way: &[Step<'a>], frame: &'a str| way.last().map_or(frame, |step| step.parent);
         if top(&up, parent) != top(&down, child) {
