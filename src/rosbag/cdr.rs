@@ -122,25 +122,21 @@ mod tests {
     /// A text, two numbers of eight bytes, a number of four: both orders of bytes, both versions.
     #[test]
     fn values_are_found_wherever_alignment_puts_them() {
-        let little: &[u8] =
-            &[0, 1, 0, 0, 2, 0, 0, 0, b'a', 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f, 7, 0, 0, 0];
-        let big: &[u8] =
-            &[0, 0, 0, 0, 0, 0, 0, 2, b'a', 0, 0, 0, 0, 0, 0, 1, 0x3f, 0xf0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 7];
+        let text = ([2, 0, 0, 0], [b'a', 0, 0, 0]);
+        let numbers = (1u32, 1f64, 7i32);
         // Behind three numbers of four bytes the second version needs no filling.
-        let second = |head: u8, bytes: &[u8]| {
-            [&[0, head, 0, 0], &bytes[4..8], &bytes[8..12], &[1, 1, 1, 1], &bytes[16..]].concat()
-        };
-        for message in [little, big] {
-            let mut cdr = Cdr::new(message).expect("CDR");
-            assert_eq!((cdr.text(), cdr.u32(), cdr.f64(), cdr.i32()), (Ok("a"), Ok(1), Ok(1.0), Ok(7)));
-            assert_eq!(cdr.end(), Ok(()));
-        }
-        for message in [second(7, little), second(6, big)] {
-            let mut cdr = Cdr::new(&message).expect("CDR");
-            assert_eq!(
-                (cdr.text(), cdr.u32(), cdr.f64(), cdr.i32()),
-                (Ok("a"), Ok(0x0101_0101), Ok(1.0), Ok(7))
-            );
+        for (version, filling) in [(0, &[0; 4][..]), (6, &[])] {
+            let (length, letters) = text;
+            let (a, b, c) = numbers;
+            let little = [[0, version + 1, 0, 0], length, letters, a.to_le_bytes()].concat();
+            let little = [&little[..], filling, &b.to_le_bytes(), &c.to_le_bytes()].concat();
+            let big = [[0, version, 0, 0], [0, 0, 0, 2], letters, a.to_be_bytes()].concat();
+            let big = [&big[..], filling, &b.to_be_bytes(), &c.to_be_bytes()].concat();
+            for message in [little, big] {
+                let mut cdr = Cdr::new(&message).expect("CDR");
+                assert_eq!((cdr.text(), cdr.u32(), cdr.f64(), cdr.i32()), (Ok("a"), Ok(a), Ok(b), Ok(c)));
+                assert_eq!(cdr.end(), Ok(()));
+            }
         }
         let mut aligned =
             Cdr::new(&[0, 1, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f]).expect("CDR");

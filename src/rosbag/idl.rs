@@ -266,13 +266,13 @@ mod tests {
         assert_eq!(
             fields,
             [
-                ("geometry_msgs/Pose", "pose", 13),
-                ("float64[36]", "covariance", 15),
-                ("string[]", "names", 16),
-                ("float64[]", "six", 16),
-                ("uint32", "n", 16),
-                ("string", "word", 16),
-                ("float32", "f", 16),
+                ("geometry_msgs/Pose", "pose", 12),
+                ("float64[36]", "covariance", 14),
+                ("string[]", "names", 15),
+                ("float64[]", "six", 15),
+                ("uint32", "n", 15),
+                ("string", "word", 15),
+                ("float32", "f", 15),
             ]
         );
     }
