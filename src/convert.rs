@@ -4,6 +4,8 @@
 //! not say is not guessed: an error lists what has to be told. A [`Map`] says all of it; `docs/convert.md`.
 
 mod align;
+#[cfg(feature = "rosbag")]
+mod bag;
 mod capture;
 mod cell;
 mod columns;
@@ -19,8 +21,11 @@ mod map;
 mod matrix;
 mod measured;
 mod moment;
+#[cfg(not(feature = "rosbag"))]
+mod no_bag;
 mod nominal;
 mod npy;
+mod older_bag;
 mod plan;
 mod positioning;
 mod r_test;
@@ -33,10 +38,16 @@ mod table;
 mod target;
 mod targets;
 mod text;
+#[cfg(feature = "rosbag")]
+mod topics;
 mod unit;
 mod write;
 
+use std::io::{BufReader, Read};
 use std::path::Path;
+
+#[cfg(not(feature = "rosbag"))]
+use no_bag as bag;
 
 pub(crate) use cell::plain;
 pub use follow::Alignment;
@@ -79,8 +90,47 @@ pub struct Converted {
 /// As [`read`], and [`Error::File`].
 pub fn open(path: impl AsRef<Path>, machine: Option<&Machine>, request: &Request) -> Result<Converted> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|source| Error::file(path, source))?;
+    let fault = |source| Error::file(path, source);
+    let mut file = std::fs::File::open(path).map_err(fault)?;
+    let mut bytes = Vec::new();
+    (&mut file).take(bag::MAGIC.len() as u64).read_to_end(&mut bytes).map_err(fault)?;
+    if bytes == bag::MAGIC {
+        // Bags have cameras in them, and are larger than memory.
+        return of_bag(path, bytes.chain(BufReader::new(file)), machine, request);
+    }
+    file.read_to_end(&mut bytes).map_err(fault)?;
     read(path, &bytes, machine, request)
+}
+
+/// The recording of a bag, which `input` reads from its beginning.
+fn of_bag(file: &Path, input: impl Read, machine: Option<&Machine>, request: &Request) -> Result<Converted> {
+    let known = request.map.as_ref().map(|path| Known::open(path)).transpose()?;
+    let mut bagged = bag::read(file, input, machine, request)?;
+    let (known, notes) = match (known, machine) {
+        (Some(known), _) => (known, Vec::new()),
+        (None, Some(machine)) => {
+            let (mut map, notes) = guess::map(&bagged.table, machine, &bagged.request)?;
+            bag::order(&mut map);
+            (Known::guessed(map, file), notes)
+        }
+        (None, None) => return Err(no_machine(file)),
+    };
+    let mut told = bagged.settled(&known.map, machine)?;
+    told.extend(notes);
+    told.extend(machine.is_none().then(not_read_back));
+    let recordings = write::all(&known, &bagged.table, machine, &mut told)?;
+    Ok(Converted { recordings, map: known.map.ron(&told), told, alignment: None, positioning: None })
+}
+
+fn no_machine(file: &Path) -> Error {
+    let what = "neither a machine nor a map says what the columns are";
+    let mend =
+        "give the machine whose joints are in the table, `--machine MACHINE.ron`, or a map, `--map MAP.ron`";
+    Error::mistake(Place::file(file), what, mend)
+}
+
+fn not_read_back() -> String {
+    "not read back: `--machine` would say whether it is a recording of that machine".into()
 }
 
 /// Reads a table; `file` is only the name that messages use. Without a map the machine's joints say which columns are looked for; with a
@@ -115,9 +165,18 @@ pub fn read(
     let flag = |name: &str, (what, mend): (String, String)| {
         Error::mistake(Place::file(file), format!("--{name}: {what}"), mend)
     };
+    if bytes.starts_with(bag::MAGIC) {
+        return of_bag(file, bytes, machine, request);
+    }
+    older_bag::refuse(file, bytes)?;
+    if request.is_of_bag() {
+        let what = "it tells what to take of a bag of ROS 2, and this is no such file";
+        let mend = "leave --joint-topic, --pose-topic, --frames and --longest-gap out, or give a file .mcap";
+        return Err(Error::mistake(Place::file(file), what, mend));
+    }
     let form = Form::of_file(file, &bytes[..bytes.len().min(START)])?;
     // Where something is told of it, a recording is a table as any other.
-    if *request == Request::default()
+    if (Request { call: None, ..request.clone() }) == Request::default()
         && let Some(recording) = recorded::read(file, bytes, form, machine)?
     {
         let told = vec!["it is a recording already, and stays as it is".to_string()];
@@ -184,15 +243,9 @@ pub fn read(
             let (map, told) = guess::map(&table, machine, request)?;
             (Known::guessed(map, file), told)
         }
-        (None, None) => {
-            let what = "neither a machine nor a map says what the columns are";
-            let mend = "give the machine whose joints are in the table, `--machine MACHINE.ron`, or a map, `--map MAP.ron`";
-            return Err(Error::mistake(Place::file(file), what, mend));
-        }
+        (None, None) => return Err(no_machine(file)),
     };
-    if machine.is_none() {
-        told.push("not read back: `--machine` would say whether it is a recording of that machine".into());
-    }
+    told.extend(machine.is_none().then(not_read_back));
     let Some(path) = &request.path else {
         let recordings = write::all(&known, &table, machine, &mut told)?;
         let map = if is_mapped { known.map.ron(&told) } else { String::new() };

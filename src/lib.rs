@@ -35,6 +35,7 @@
 //! | [`sensor`] | what instruments read, and how that depends on every unknown |
 //! | `check` | every Jacobian against forward-mode autodiff |
 //! | `columnar` | tables in columns, Parquet and Arrow, as text and back (feature `columnar`) |
+//! | `rosbag` | bags of ROS 2: joints, poses and frames by topic (feature `rosbag`) |
 //! | [`recording`] | CSV recordings, streamed |
 //! | `motion` | directions of travel, velocities, the history of a path |
 //! | `feature` | what a deviation depends on, as a number for each sample |
@@ -173,6 +174,8 @@ mod rivals;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod rivals;
+#[cfg(feature = "rosbag")]
+mod rosbag;
 mod scalar;
 pub mod sensor;
 pub mod simulate;

@@ -66,6 +66,18 @@ pub(crate) struct Args {
     /// Readings a second, where such a table has no column of time; found by the path's feed
     #[arg(long, value_name = "RATE", value_parser = rate, requires = "path")]
     sample_rate: Option<f64>,
+    /// Topic of a bag of ROS 2 with the positions of the joints; found where only one has them
+    #[arg(long, value_name = "TOPIC")]
+    joint_topic: Option<String>,
+    /// Topic of a bag with the poses; found where only one has them
+    #[arg(long, value_name = "TOPIC", conflicts_with = "frames")]
+    pose_topic: Option<String>,
+    /// Poses of frame CHILD in frame PARENT of TF, over the frames between them
+    #[arg(long, value_name = "PARENT,CHILD", value_parser = frames)]
+    frames: Option<(String, String)>,
+    /// Longest time between joint states of a bag over which a line is drawn, such as 50ms; three of their usual intervals
+    #[arg(long, value_name = "TIME", value_parser = simulate::time)]
+    longest_gap: Option<f64>,
     /// The joint that a file of a laser or a table of deviations at targets is about
     #[arg(long, value_name = "JOINT")]
     joint: Option<String>,
@@ -75,6 +87,9 @@ pub(crate) struct Args {
     /// What deviations are: of a laser or at targets the first two, of an R-test the others
     #[arg(long, value_name = "SENSE", value_parser = ["laser-minus-target", "target-minus-laser", "ball-minus-tool", "tool-minus-ball"])]
     deviation: Option<String>,
+    /// Along which axes an R-test was read: of the tool, in which the nest stands, of the machine's base, or of the workpiece
+    #[arg(long, value_name = "AXES", value_parser = ["tool", "machine", "workpiece"])]
+    axes: Option<String>,
     /// What separates columns: comma, semicolon, tab or blanks; found by itself
     #[arg(long, value_name = "WORD", conflicts_with = "map")]
     separator: Option<String>,
@@ -88,6 +103,15 @@ pub(crate) struct Args {
     common: Common,
 }
 
+/// A word as a shell takes it.
+fn quoted(text: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "/._-+,:=\\".contains(c);
+    match text.chars().all(plain) {
+        true => text.into(),
+        false => format!("'{}'", text.replace('\'', "'\\''")),
+    }
+}
+
 /// `KEY=VALUE` at the first sign of equality.
 fn pair(text: &str) -> Result<(String, String), String> {
     let (key, value) = text.split_once('=').ok_or("write it as NAME=VALUE")?;
@@ -95,6 +119,14 @@ fn pair(text: &str) -> Result<(String, String), String> {
         return Err("nothing stands on one side of `=`".into());
     }
     Ok((key.trim().into(), value.trim().into()))
+}
+
+/// `tracker,tool`.
+fn frames(text: &str) -> Result<(String, String), String> {
+    let both = text.split_once(',').map(|(parent, child)| (parent.trim(), child.trim()));
+    let both = both.filter(|(parent, child)| !parent.is_empty() && !child.is_empty() && !child.contains(','));
+    let plain = |frame: &str| frame.strip_prefix('/').unwrap_or(frame).to_string();
+    both.map(|(parent, child)| (plain(parent), plain(child))).ok_or("write it as PARENT,CHILD".into())
 }
 
 /// `250Hz`, `1kHz`, `250`.
@@ -129,9 +161,38 @@ impl Args {
             joint: self.joint.clone(),
             approach: self.approach.clone(),
             deviation: self.deviation.clone(),
+            axes: self.axes.clone(),
             separator: self.separator.clone(),
             decimal: self.decimal.clone(),
+            joint_topic: self.joint_topic.clone(),
+            pose_topic: self.pose_topic.clone(),
+            frames: self.frames.clone(),
+            longest_gap: self.longest_gap,
+            call: Some(self.call()),
         }
+    }
+
+    /// The command that this is, ready to be pasted, for a message about a bag: all that is told of one but its topics.
+    fn call(&self) -> String {
+        let mut words = vec!["kincal".to_string(), "convert".into(), quoted(&self.file.to_string_lossy())];
+        let mut flag = |name: &str, value: &str| words.extend([format!("--{name}"), quoted(value)]);
+        let paths = [("machine", &self.machine), ("map", &self.map)];
+        for (name, path) in paths.into_iter().filter_map(|(name, path)| Some((name, path.as_ref()?))) {
+            flag(name, &path.to_string_lossy());
+        }
+        for (name, pairs) in [("column", &self.column), ("unit", &self.unit)] {
+            pairs.iter().for_each(|(key, value)| flag(name, &format!("{key}={value}")));
+        }
+        self.head.iter().for_each(|line| flag("head", line));
+        let told = [("measurement", &self.measurement), ("time-zero", &self.time_zero)];
+        for (name, value) in told.into_iter().filter_map(|(name, value)| Some((name, value.as_ref()?))) {
+            flag(name, value);
+        }
+        if let Some(gap) = self.longest_gap {
+            flag("longest-gap", &format!("{gap}s"));
+        }
+        flag("output", &self.output.to_string_lossy());
+        words.join(" ")
     }
 }
 

@@ -15,6 +15,7 @@ use serde_json::json;
 
 use super::files::Files;
 use super::output::{Kind, Outcome, count, length, open_machine, table, write_recording, write_whole};
+pub(crate) use amounts::time;
 pub(crate) use args::Args;
 use args::DropAs;
 use build::{Built, build, usage};

@@ -4,8 +4,12 @@
 //! them; what the recording holds is where the tool point stood in frame `w`:
 //!
 //! ```text
-//! p_w = ball_w - R_w_from_t e_t          e_t: ball less tool point, along the axes of frame t
+//! p_w = ball_w - e_w          e_w: ball less tool point, along the axes of frame w
+//! e_w = R_w_from_t e_t = R_w_from_b e_b
 //! ```
+//!
+//! A nest reads along the axes of frame t, in which it stands; a control or an evaluation may write the same along the axes of the machine's
+//! base or of the workpiece, which turn with the table. Headings do not tell these apart, so it is asked.
 
 use super::Request;
 use super::deviations::Measured;
@@ -16,7 +20,7 @@ use super::joints;
 use super::map::{Known, Map, MappedColumn};
 use super::plan::Plan;
 use super::table::{Row, Table};
-use crate::chain::Chain;
+use crate::chain::{Chain, Sweep};
 use crate::error::{Error, Place, Result};
 use crate::lie::Vec3;
 use crate::machine::{JointKind, Machine};
@@ -42,6 +46,44 @@ const DEVIATION: [&str; 14] = [
     "ball",
     "sphere",
 ];
+/// Axes along which deviations were read, as `--axes` calls them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Axes {
+    Tool,
+    Machine,
+    Workpiece,
+}
+
+impl Axes {
+    fn named(word: &str) -> Option<Axes> {
+        Some(match word {
+            "tool" => Axes::Tool,
+            "machine" => Axes::Machine,
+            "workpiece" => Axes::Workpiece,
+            _ => return None,
+        })
+    }
+
+    /// A deviation along these axes, along those of frame w.
+    fn to_w(self, sweep: &Sweep<f64>, e: Vec3<f64>) -> Vec3<f64> {
+        match self {
+            Axes::Tool => sweep.w_from_t().rotation * e,
+            Axes::Machine => sweep.b_from_w().rotation.transpose() * e,
+            Axes::Workpiece => e,
+        }
+    }
+
+    fn told(self) -> &'static str {
+        match self {
+            Axes::Tool => "deviations are taken along the axes of frame t, in which the nest stands",
+            Axes::Machine => "deviations are taken along the axes of the machine's base",
+            Axes::Workpiece => {
+                "deviations are taken along the axes of frame w, which turn with the workpiece"
+            }
+        }
+    }
+}
+
 /// What linear axes may leave between tool and ball, m.
 const CLOSED: f64 = 1e-9;
 
@@ -82,7 +124,16 @@ pub(super) fn read(table: &Table, machine: &Machine, request: &Request) -> Resul
             1.0
         }
     };
-    let (map, told) = draft.closed()?;
+    let axes = request.axes.as_deref().and_then(Axes::named);
+    if axes.is_none() {
+        draft.ask(
+            "along which axes the deviations were read: of frame t, in which the nest stands, of the machine's base, or of the workpiece, which turn with the table",
+            "--axes tool|machine|workpiece",
+        );
+    }
+    let (map, mut told) = draft.closed()?;
+    let axes = axes.unwrap_or(Axes::Tool);
+    told.push(axes.told().into());
     let (Some(ball), Some(tool_t)) = (ball, tool_t) else {
         return Err(Error::mistake(
             Place::file(&table.file),
@@ -105,7 +156,7 @@ pub(super) fn read(table: &Table, machine: &Machine, request: &Request) -> Resul
     }
     let still = &still;
     let written =
-        Sheet { table, machine, plan: &plan, solve: &solve, ball, tool_t, sign, still }.written()?;
+        Sheet { table, machine, plan: &plan, solve: &solve, ball, tool_t, sign, axes, still }.written()?;
     Ok(finished(table, &known.map, machine, written, &solve, told))
 }
 
@@ -198,6 +249,7 @@ struct Sheet<'a> {
     ball: Vec3<f64>,
     tool_t: Vec3<f64>,
     sign: f64,
+    axes: Axes,
     /// Commands of what the head says to stand still; 0 of the others.
     still: &'a [f64],
 }
@@ -240,7 +292,7 @@ impl Sheet<'_> {
             }
             let [x, y, z] = e;
             if let (Some(x), Some(y), Some(z)) = (x?, y?, z?) {
-                let e_w = chain.sweep(&q).w_from_t().rotation * Vec3([x, y, z]).times(self.sign);
+                let e_w = self.axes.to_w(&chain.sweep(&q), Vec3([x, y, z]).times(self.sign));
                 p = Some(self.ball - e_w);
             }
         }
@@ -326,7 +378,6 @@ fn finished(
         names: Vec::new(),
         ..map.clone()
     };
-    told.push("deviations are taken along the axes of frame t, in which the nest stands".into());
     if !solve.is_empty() {
         let names: Vec<&str> = solve.iter().map(|c| commands[*c].as_str()).collect();
         told.push(format!(

@@ -39,6 +39,8 @@ pub struct Request {
     pub approach: Option<String>,
     /// What deviations are: of a laser `laser-minus-target` or `target-minus-laser`, of an R-test `ball-minus-tool` or `tool-minus-ball`.
     pub deviation: Option<String>,
+    /// Along which axes the deviations of an R-test were read: `tool`, `machine` or `workpiece`.
+    pub axes: Option<String>,
     /// What separates columns: `comma`, `semicolon`, `tab`, `blanks`.
     pub separator: Option<String>,
     /// `point` or `comma`.
@@ -47,6 +49,16 @@ pub struct Request {
     pub path: Option<Nominal>,
     /// Readings a second, where such a table has no column of time.
     pub sample_rate: Option<f64>,
+    /// The topic of a bag that has the positions of the joints; the only one where none is told.
+    pub joint_topic: Option<String>,
+    /// The topic of a bag that has the poses.
+    pub pose_topic: Option<String>,
+    /// Parent and child in TF, in the place of a topic of poses.
+    pub frames: Option<(String, String)>,
+    /// Time between joint states of a bag over which a line is drawn, s; three of their usual intervals where none is told.
+    pub longest_gap: Option<f64>,
+    /// The command that this is, for messages that show it with what is to be added.
+    pub call: Option<String>,
 }
 
 /// Each returns the same request with one thing more told, as the field of that name has it.
@@ -156,6 +168,13 @@ impl Request {
         self
     }
 
+    /// With deviations of an R-test along the axes of the `tool`, the `machine` or the `workpiece`.
+    #[must_use]
+    pub fn with_axes(mut self, axes: impl Into<String>) -> Self {
+        self.axes = Some(axes.into());
+        self
+    }
+
     /// With what separates columns.
     #[must_use]
     pub fn with_separator(mut self, separator: impl Into<String>) -> Self {
@@ -175,6 +194,47 @@ impl Request {
     pub fn with_path(mut self, path: Nominal) -> Self {
         self.path = Some(path);
         self
+    }
+
+    /// With the positions of the joints of this topic of a bag.
+    #[must_use]
+    pub fn with_joint_topic(mut self, topic: impl Into<String>) -> Self {
+        self.joint_topic = Some(topic.into());
+        self
+    }
+
+    /// With the poses of this topic of a bag.
+    #[must_use]
+    pub fn with_pose_topic(mut self, topic: impl Into<String>) -> Self {
+        self.pose_topic = Some(topic.into());
+        self
+    }
+
+    /// With the poses of `child` in `parent`, two frames of TF.
+    #[must_use]
+    pub fn with_frames(mut self, parent: impl Into<String>, child: impl Into<String>) -> Self {
+        self.frames = Some((parent.into(), child.into()));
+        self
+    }
+
+    /// With lines between joint states of a bag that are no further apart than this, s.
+    #[must_use]
+    pub fn with_longest_gap(mut self, seconds: f64) -> Self {
+        self.longest_gap = Some(seconds);
+        self
+    }
+
+    /// With the command that this is.
+    #[must_use]
+    pub fn with_call(mut self, call: impl Into<String>) -> Self {
+        self.call = Some(call.into());
+        self
+    }
+
+    /// Whether something is told that only a bag has.
+    pub(super) fn is_of_bag(&self) -> bool {
+        let topic = self.joint_topic.is_some() || self.pose_topic.is_some();
+        topic || self.frames.is_some() || self.longest_gap.is_some()
     }
 
     /// With so many readings a second.

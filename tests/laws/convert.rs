@@ -403,6 +403,35 @@ fn tables_in_columns_are_known_where_nothing_reads_them() {
     assert_eq!(error.to_string(), "a.parquet: this build of kincal writes no Parquet file");
 }
 
+/// Bags are known by their first bytes, those that nothing reads too.
+#[test]
+fn bags_that_are_not_read_are_told_how_to_go_on() {
+    let scara = machine("scara");
+    let says = |file: &str, start: &[u8]| {
+        let error = read(file, start, Some(&scara), &Request::default()).expect_err("no reader");
+        format!("{error}\n  = {}", error.mend())
+    };
+    let old = says("a.bag", b"#ROSBAG V2.0\n");
+    assert!(
+        old.starts_with(
+            "a.bag: this is a bag of ROS 1, which is not read\n  = `rosbags-convert --src 'a.bag'"
+        ),
+        "{old}"
+    );
+    assert!(says("a.db3", b"SQLite format 3\0").starts_with("a.db3: this is a bag of ROS 2 in SQLite"));
+    let says = says("a.mcap", b"\x89MCAP0\r\n");
+    match cfg!(feature = "rosbag") {
+        true => assert!(says.starts_with("a.mcap: no topic has positions of joints"), "{says}"),
+        false => assert_eq!(
+            says,
+            "a.mcap: this is a bag of ROS 2 (MCAP), which this build of kincal does not read\n  = build it with `--features rosbag`; the module for Python reads bags: `pip install ./python`"
+        ),
+    }
+    let told = Request::default().with_pose_topic("/pose");
+    let error = read("t.csv", b"t_s,x_mm\n0,1\n", Some(&scara), &told).expect_err("no bag");
+    assert!(error.mend().contains("leave --joint-topic, --pose-topic, --frames and --longest-gap out"));
+}
+
 /// What says of itself what was measured needs no machine, no map and no guess; where a flag says something it is a table.
 #[test]
 fn a_recording_stays_as_it_is() {

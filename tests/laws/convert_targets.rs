@@ -4,6 +4,7 @@ use crate::common::machine;
 use kincal::convert::{Converted, Request, read};
 use kincal::identify::{CalibrateOptions, calibrate};
 use kincal::lie::Vec3;
+use kincal::machine::JointKind;
 use kincal::recording::Recording;
 use kincal::simulate::random_deviations;
 use kincal::{Chain, Machine};
@@ -226,6 +227,7 @@ fn an_r_test_says_where_the_tool_stood() {
     let request = Request::default()
         .with_measurement("r-test")
         .with_deviation("ball-minus-tool")
+        .with_axes("tool")
         .with_head("workpiece_point[mm]: 120, 20, 50");
     let found = converted(&table, &machine, &request);
     let text = &found.recordings[0].text;
@@ -252,13 +254,89 @@ fn an_r_test_says_where_the_tool_stood() {
     let error = read("r.csv", table.as_bytes(), Some(&machine), &asked).expect_err("not told");
     let said = error.to_string();
     for what in [
-        "2 things have",
+        "3 things have",
+        "along which axes the deviations were read",
+        "--axes tool|machine|workpiece",
         "where the ball stands",
         "--head 'workpiece_point[mm]: X,Y,Z'",
         "--deviation ball-minus-tool|tool-minus-ball",
     ] {
         assert!(said.contains(what), "{said}");
     }
+}
+
+/// What a nest reads is one displacement, along whichever axes it is written: on a table that turns, and on a head that does.
+#[test]
+fn an_r_test_along_the_axes_of_the_workpiece_is_the_same_test() {
+    for name in ["ac_table_tilting", "bc_head_table"] {
+        let machine = machine(name);
+        let dh = random_deviations(&machine, 1.0, 8);
+        let (nominal, actual) = (Chain::nominal(&machine), Chain::new(&machine, &dh));
+        let ball = Vec3([0.12, 0.02, 0.05]);
+        let commands = machine.commands();
+        let rotary: Vec<usize> =
+            (0..commands.len()).filter(|c| machine.command_joint(*c).kind == JointKind::Revolute).collect();
+        let linear: Vec<usize> = (0..commands.len()).filter(|c| !rotary.contains(c)).collect();
+        let names: Vec<String> = rotary.iter().map(|c| format!("{} (deg)", commands[*c])).collect();
+        let mut tables = [(); 3].map(|()| format!("{},dX (um),dY (um),dZ (um)\n", names.join(",")));
+        for k in 0..40 {
+            let mut q = vec![0.0; commands.len()];
+            q[rotary[0]] = f64::from((k * 37) % 80 - 40).to_radians();
+            q[rotary[1]] = f64::from((k * 53) % 80 - 40).to_radians();
+            follow(&nominal, &linear, ball, &mut q);
+            let sweep = nominal.sweep(&q);
+            let e_w = ball - actual.w_from_t(&q).translation;
+            let e_t = sweep.w_from_t().rotation.transpose() * e_w;
+            let e_b = sweep.b_from_w().rotation * e_w;
+            for (table, e) in tables.iter_mut().zip([e_t, e_b, e_w]) {
+                let turned = rotary.iter().map(|c| format!("{:.9}", q[*c].to_degrees()));
+                let read = e.0.iter().map(|x| format!("{:.7}", x * 1e6));
+                *table += &format!("{}\n", turned.chain(read).collect::<Vec<_>>().join(","));
+            }
+        }
+        let told = Request::default()
+            .with_measurement("r-test")
+            .with_deviation("ball-minus-tool")
+            .with_head("workpiece_point[mm]: 120, 20, 50");
+        let found = tables.iter().zip(["tool", "machine", "workpiece"]).map(|(table, axes)| {
+            let found = converted(table, &machine, &told.clone().with_axes(axes));
+            let text = found.recordings[0].text.clone().into_bytes();
+            let recording = Recording::from_bytes("r.csv", text, &machine).expect("a recording");
+            calibrate(&machine, &[recording], CalibrateOptions::default()).expect("sound")
+        });
+        let found: Vec<_> = found.collect();
+        let rms = |k: usize| found[k].1.rms.m.expect("positions");
+        assert!(rms(0).geometric < 1e-7 && rms(0).nominal > 1e-5, "{name} {:?}", rms(0));
+        for k in [1, 2] {
+            let both = found[0].0.deviations().iter().zip(found[k].0.deviations());
+            let apart =
+                both.flat_map(|(a, b)| (0..6).map(move |i| (a.to_array()[i] - b.to_array()[i]).abs()));
+            // Recordings are written to a tenth of a nanometre.
+            assert!(apart.fold(0.0, f64::max) < 1e-8, "{name} {k}");
+        }
+        // Taken along other axes it is no such machine.
+        let wrong = converted(&tables[2], &machine, &told.clone().with_axes("tool"));
+        let text = wrong.recordings[0].text.clone().into_bytes();
+        let recording = Recording::from_bytes("r.csv", text, &machine).expect("a recording");
+        let (_, fit) = calibrate(&machine, &[recording], CalibrateOptions::default()).expect("sound");
+        assert!(fit.rms.m.expect("positions").geometric > 1e-6, "{name}");
+    }
+}
+
+/// Moves linear axes until the tool point is at `ball`: each moves along one line, so that one step is exact.
+fn follow(chain: &Chain<f64>, linear: &[usize], ball: Vec3<f64>, q: &mut [f64]) {
+    let gap = ball - chain.w_from_t(q).translation;
+    let at = |q: &[f64]| chain.w_from_t(q).translation;
+    let zero = at(q);
+    let column = |c: &usize| {
+        let mut moved = q.to_vec();
+        moved[*c] += 1.0;
+        (at(&moved) - zero).0
+    };
+    let columns: Vec<[f64; 3]> = linear.iter().map(column).collect();
+    let m = kincal::nalgebra::Matrix3::from_fn(|i, j| columns[j][i]);
+    let step = m.try_inverse().expect("three axes") * kincal::nalgebra::Vector3::from(gap.0);
+    linear.iter().zip(step.iter()).for_each(|(c, x)| q[*c] += x);
 }
 
 /// A dynamic capture: `readings` behind a head.
@@ -324,6 +402,7 @@ fn gaps_in_tables_of_deviations_are_told() {
     let ball = Request::default()
         .with_measurement("r-test")
         .with_deviation("ball-minus-tool")
+        .with_axes("tool")
         .with_head("workpiece_point[mm]: 120, 20, 50");
     for (table, machine, request) in [(wide, &mill, &of_x()), (across, &mill, &told), (r_test, &five, &ball)]
     {
