@@ -40,7 +40,7 @@ impl<'a> Ahead<'a> {
         let q = self.program.joints(block, &target)?;
         self.program.take_way();
         if !drills {
-            self.meant.push(q.clone());
+            self.meant.push(Few::from_slice(&q));
         }
         let end = Position::new(q, target);
         self.program.arrive(end.clone(), end);

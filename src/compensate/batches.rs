@@ -27,8 +27,8 @@ use crate::nc::{Block, Program};
 /// Lines of a batch, and lines before it from which it is begun.
 const LINES: usize = 512;
 const LEAD: usize = 4;
-/// Batches that are corrected side by side.
-const GROUP: usize = 16;
+/// Batches that are corrected side by side, each as soon as a thread is free. Most of the memory that all takes is that of two groups.
+const GROUP: usize = 8;
 
 /// Whether a batch ends behind so many lines: one does before the line that a mark is written before.
 pub(super) fn ends_batch(passed: usize, foot: &Foot) -> bool {
@@ -80,6 +80,8 @@ struct Reader<'a, 'f, R> {
     ahead: Option<Ahead<'a>>,
     /// From where the next batch is begun.
     lead: Option<Lead<'a>>,
+    /// Blocks that are done with: the next ones stand in their memory.
+    spent: Vec<Block>,
     passed: usize,
     without_point: u64,
 }
@@ -122,6 +124,7 @@ pub(super) fn correct<'a, R: BufRead + Send>(
         none: SubPrograms::default(),
         ahead,
         lead: None,
+        spent: Vec::new(),
         passed: 0,
         without_point: 0,
     };
@@ -132,7 +135,7 @@ pub(super) fn correct<'a, R: BufRead + Send>(
         let stopped = stop.is_some();
         let (next, done) = rayon::join(
             || if stopped { (Vec::new(), None) } else { reader.next_group() },
-            || present.into_par_iter().map(|batch| how.begin(batch)).collect::<Vec<_>>(),
+            || present.into_par_iter().with_max_len(1).map(|batch| how.begin(batch)).collect::<Vec<_>>(),
         );
         let (mut count, mut missed) = (0, 0);
         for (mut batch, done) in done {
@@ -154,6 +157,7 @@ pub(super) fn correct<'a, R: BufRead + Send>(
             if let Some(error) = written.error {
                 return Err(error);
             }
+            reader.spent.append(&mut batch.blocks);
         }
         // A program whose lines hang together that much is better written one after the other.
         if 2 * missed > count + 1 {
@@ -229,10 +233,17 @@ impl<'a, R: BufRead> Reader<'a, '_, R> {
         (batch, stop)
     }
 
+    fn next_block(&mut self) -> Result<Option<Block>> {
+        match self.spent.pop() {
+            Some(spent) => self.program.next_block_over(spent),
+            None => self.program.next_block(),
+        }
+    }
+
     /// Reads the lines of a batch; what stopped the reading.
     fn fill(&mut self, batch: &mut Batch<'a>) -> Option<Error> {
         loop {
-            let mut block = match self.program.next_block() {
+            let mut block = match self.next_block() {
                 Ok(Some(block)) => block,
                 Ok(None) => return None,
                 Err(error) => return Some(error),

@@ -8,7 +8,7 @@ use super::frame::{Change, Frame};
 use super::position::Position;
 use super::setup::{Setup, ToolAxis};
 use crate::chain::Chain;
-use crate::few::Few;
+use crate::few::{Few, pairwise};
 use crate::inverse::{Goal, Inverse, InverseOptions, Mode};
 use crate::lie::{Mat3, Pose, Vec3};
 use crate::machine::{Branch, Machine};
@@ -313,23 +313,24 @@ impl<'a> Control<'a> {
             }
             p = back.transform(Vec3(p)).0;
         }
-        let of = |(i, axis): (usize, &Axis)| match (axis.tip(), axis.command()) {
-            (Some(k), _) => p[k],
-            (None, Some((c, sign))) => sign * q[c] - self.offset[i] - self.frame.shift(i),
-            (None, None) => other[i],
-        };
-        self.axes.iter().enumerate().map(of).collect()
+        let mut program = Few::from_slice(other);
+        for (i, axis) in self.axes.iter().enumerate() {
+            match (axis.tip(), axis.command()) {
+                (Some(k), _) => program[i] = p[k],
+                (None, Some((c, sign))) => program[i] = sign * q[c] - self.offset[i] - self.frame.shift(i),
+                (None, None) => {}
+            }
+        }
+        program
     }
 
     /// The joints at a part `s` of a straight move, as the control moves them.
     pub fn between(&self, a: &Position, b: &Position, s: f64) -> Option<Few<f64>> {
-        let mix =
-            |a: &[f64], b: &[f64]| -> Few<f64> { a.iter().zip(b).map(|(a, b)| a + (b - a) * s).collect() };
-        let q = mix(a.q(), b.q());
+        let q = mixed(a.q(), b.q(), s);
         if !self.tcp {
             return Some(q);
         }
-        self.joints(&mix(a.program(), b.program()), &q)
+        self.joints(&mixed(a.program(), b.program(), s), &q)
     }
 
     /// Where the tip is meant to be in frame `w` at some parts of a straight move, m.
@@ -339,14 +340,11 @@ impl<'a> Control<'a> {
         b: &Position,
         parts: [f64; N],
     ) -> [Vec3<f64>; N] {
-        let mix = |a: &[f64], b: &[f64], s: f64| -> Few<f64> {
-            a.iter().zip(b).map(|(a, b)| a + (b - a) * s).collect()
-        };
         if self.tcp {
             let place = self.w_from_program * self.frame.pose();
-            return parts.map(|s| place.transform(self.triple(&mix(a.program(), b.program(), s))));
+            return parts.map(|s| place.transform(self.triple(&mixed(a.program(), b.program(), s))));
         }
-        self.nominal.tool_points(&parts.map(|s| mix(a.q(), b.q(), s)), self.tip().translation)
+        self.nominal.tool_points(&parts.map(|s| mixed(a.q(), b.q(), s)), self.tip().translation)
     }
 
     /// Calls a position by the coordinates in force; the machine has not moved.
@@ -367,4 +365,9 @@ impl<'a> Control<'a> {
             self.axes.iter().filter(|a| a.tip().is_some()).all(|a| a.command().is_some() && !a.is_rotary());
         linear && self.inverse.freedoms().1 == 3
     }
+}
+
+/// What lies a part `s` of the way from `a` to `b`.
+fn mixed(a: &[f64], b: &[f64], s: f64) -> Few<f64> {
+    pairwise(a, b, |a, b| a + (b - a) * s)
 }

@@ -12,7 +12,7 @@ use super::style::{Style, plain};
 use super::tip_error::TipError;
 use crate::calibration::LeftOut;
 use crate::chain::Chain;
-use crate::decimal::{self, fixed};
+use crate::decimal::{self, Text, fixed};
 use crate::few::Few;
 use crate::inverse::{Foreseen, Goal, Inverse, Mode, Solution, foresee};
 use crate::lie::{Twist, Vec3};
@@ -23,7 +23,7 @@ use crate::nc::{Block, Dialect, How, Number, Word};
 #[derive(Clone)]
 pub(super) struct AxisNumber {
     axis: usize,
-    text: String,
+    text: Text,
 }
 
 impl AxisNumber {
@@ -34,7 +34,7 @@ impl AxisNumber {
 
     /// Programmed units, with a decimal point.
     pub fn text(&self) -> &str {
-        &self.text
+        std::str::from_utf8(&self.text).unwrap_or_default()
     }
 }
 
@@ -140,16 +140,16 @@ impl<'a, 'm> Corrector<'a, 'm> {
             // Errors that bend from place to place are looked at there.
             Cow::Owned(_) => return,
         };
-        self.foreseen = found.into_iter().flatten().collect();
+        self.foreseen = found.into();
     }
 
-    /// A position that was foreseen, if this is one.
-    fn foreseen(&mut self, control: &Control, meant: &[f64], free: &[bool]) -> Option<Foreseen> {
+    /// What was foreseen of a position, if it was.
+    fn foreseen(&mut self, control: &Control, meant: &[f64], free: &[bool]) -> Option<(Goal, Solution)> {
         let is_same = |a: &[f64]| a.iter().zip(meant).all(|(a, b)| a.to_bits() == b.to_bits());
         let at = self.foreseen.iter().take(FORESEEN).position(|next| is_same(&next.meant))?;
         self.foreseen.drain(..at);
         let next = self.foreseen.front().filter(|next| next.goal.t_from_tip == control.tip())?;
-        free.iter().all(|free| *free).then(|| next.clone())
+        free.iter().all(|free| *free).then(|| (next.goal, next.solution.clone()))
     }
 
     /// The position that was corrected last.
@@ -258,7 +258,7 @@ impl<'a, 'm> Corrector<'a, 'm> {
         let free = program.free();
         let foreseen = self.foreseen(control, q, &free);
         let (goal, chain, solution) = match foreseen {
-            Some(Foreseen { goal, solution, .. }) => (goal, self.model.chain_at(q), solution),
+            Some((goal, solution)) => (goal, self.model.chain_at(q), solution),
             None => {
                 let goal = control.goal(q);
                 let (chain, solution) = self.settle(&goal, q, &free);
@@ -266,7 +266,7 @@ impl<'a, 'm> Corrector<'a, 'm> {
             }
         };
         let mut exact: Few<f64> = Few::from_slice(&solution.commands);
-        let (slip, mut numbers) = (control.slip(), Vec::new());
+        let (slip, mut numbers) = (control.slip(), Vec::with_capacity(control.axes().len()));
         let mut coordinates = Few::from_slice(program.written().program());
         let word = |i: usize| block.zip(words.get(i).copied().flatten()).map(|(b, w)| &b.words()[w]);
         let rotary = |i: usize| control.axes()[i].is_rotary();
@@ -281,7 +281,8 @@ impl<'a, 'm> Corrector<'a, 'm> {
                 rounded[i] = coordinates[i];
             }
             if let Some(there) = control.joints(&rounded, &exact) {
-                let slides: Few<bool> = (0..free.len()).map(|c| free[c] && self.is_prismatic(c)).collect();
+                let mut slides = Few::from_slice(&free);
+                slides.iter_mut().enumerate().for_each(|(c, free)| *free &= self.is_prismatic(c));
                 if slides.iter().filter(|s| **s).count() == 3 {
                     let slid = self.solvers.slides.slide(&chain, &goal, &there, &slides);
                     exact = slid.unwrap_or_else(|| {
@@ -312,13 +313,13 @@ impl<'a, 'm> Corrector<'a, 'm> {
         is_asked: &dyn Fn(usize) -> bool,
     ) -> Vec<usize> {
         let (control, places) = (program.control(), program.places());
-        let mut free = program.free();
         let asked =
             |i: &usize| !places.is_placed(*i) && control.axes()[*i].command().is_some() && is_asked(*i);
         let unplaced: Vec<usize> = (0..places.len()).filter(asked).collect();
         if unplaced.is_empty() {
             return unplaced;
         }
+        let mut free = program.free();
         // Where a rotary axis stands decides on the correction of all others.
         let (mut wanted, slides): (Vec<usize>, Vec<usize>) =
             unplaced.into_iter().partition(|i| control.axes()[*i].is_rotary());
@@ -370,18 +371,22 @@ fn number(
         _ => {}
     }
     let places = style.places(control, axis).max(word.and_then(plain).map_or(0, |n| n.decimals));
-    let half = 0.500_001 * 10f64.powi(-(places as i32));
+    let half = 0.500_001 * decimal::unit(places);
     let stands = |number: f64| match how {
         How::Incremental => slip + control.si(axis, from + number),
         How::Shortest | How::Positive | How::Negative => wanted + control.si(axis, number - value),
         _ => slip + control.si(axis, number),
     };
-    let (text, dialect) = match word.and_then(plain) {
+    let text = match word.and_then(plain) {
         Some(number) => {
             if (value - number.value).abs() <= half {
                 return stands(number.value);
             }
-            (number.write_like(value, Some(places)), Dialect::Heidenhain)
+            if let Some((text, written)) = number.rounded_like(value, Some(places)) {
+                numbers.push(AxisNumber { axis, text });
+                return stands(written);
+            }
+            number.write_like(value, Some(places))
         }
         None => {
             let same = match how {
@@ -391,13 +396,11 @@ fn number(
             if same || !program.places().is_placed(axis) || control.axes()[axis].command().is_none() {
                 return now;
             }
-            (fixed(value, places), Dialect::Rs274)
+            fixed(value, places)
         }
     };
-    let plain = decimal::read(text.as_bytes(), 0).filter(|(_, end)| *end == text.len());
-    let written =
-        plain.map(|(value, _)| value).or_else(|| Some(Number::parse(text.as_bytes(), dialect)?.value));
-    let Some(written) = written else { return now };
-    numbers.push(AxisNumber { axis, text });
-    stands(written)
+    // With the comma of those that write one.
+    let Some(written) = Number::parse(text.as_bytes(), Dialect::Heidenhain) else { return now };
+    numbers.push(AxisNumber { axis, text: Text::from_slice(text.as_bytes()) });
+    stands(written.value)
 }

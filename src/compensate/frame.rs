@@ -53,7 +53,11 @@ impl Frame {
             }
         }
         let inside = self.pose.rotation.transpose() * Vec3(outside);
-        axes.iter().zip(&self.slip).map(|(axis, slip)| axis.tip().map_or(*slip, |k| inside.0[k])).collect()
+        let mut slip = Few::from_slice(&self.slip);
+        for (axis, slip) in axes.iter().zip(&mut slip) {
+            *slip = axis.tip().map_or(*slip, |k| inside.0[k]);
+        }
+        slip
     }
 
     /// The number of a preset has been written smaller by `slip` than the place that it names.

@@ -191,15 +191,21 @@ impl<'a> Interpreter<'a> {
 
     /// The short way through [`Interpreter::block`] for a block that can change no more than where axes are, the motion and the feed.
     fn plain_motion(&mut self, block: &Block) -> Result<Option<Event>> {
-        let step = self.state.apply(block)?;
+        let (motion, unfollowed) = match self.state.apply_plain(block) {
+            Some(motion) => (motion, None),
+            None => {
+                let step = self.state.apply(block)?;
+                (step.motion, step.unfollowed)
+            }
+        };
         if let Some(word) = block.words().iter().find(|w| w.address == "F") {
             self.feed = word.number().map(|feed| (feed, block.text(&word.value_span)));
         }
-        if let Some(piece) = &step.unfollowed {
+        if let Some(piece) = &unfollowed {
             let text = block.text(&piece.span).chars().take(60).collect();
             return refuse(block, piece.span.start, CompensateFault::NotFollowed { what: piece.what, text });
         }
-        step.motion.map(|motion| self.motion(block, motion)).transpose()
+        motion.map(|motion| self.motion(block, motion)).transpose()
     }
 
     /// M codes, tools and positions beside the words of the block, which send axes elsewhere.

@@ -34,14 +34,15 @@ impl Survey {
             mark: None,
             foot: Foot::default(),
         };
-        while let Some(bytes) = program.next_line()? {
+        let mut bytes = Vec::new();
+        while program.next_line(&mut bytes)? {
             survey.fingerprint.take(&bytes);
             survey.foot.look(program.line(), &bytes);
             // Most lines are motions alone, and need no closer look.
             if program.increments().is_empty() && !bounds.is_inside() && !may_tell(&bytes) {
                 continue;
             }
-            let block = program.block_of(bytes);
+            let block = program.block_of(std::mem::take(&mut bytes));
             if !program.increments().is_empty()
                 && (dialect != Dialect::Rs274 || block.words().iter().any(is_inch))
             {
@@ -117,8 +118,8 @@ pub(super) fn read_as<R: BufRead>(
 }
 
 fn is_ambiguous(word: &Word) -> bool {
-    COUNTED[..9].contains(&word.address.as_str())
-        && matches!(word.value, Value::Number(number) if !number.has_point && number.value != 0.0)
+    matches!(word.value, Value::Number(number) if !number.has_point && number.value != 0.0)
+        && matches!(word.address.letter(), Some(b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W'))
 }
 
 /// Numbers of axes in a block that are not zero and have no point.

@@ -3,10 +3,17 @@
 use crate::few::Few;
 
 /// A position, as joints and as program coordinates in the frame in force; m or rad.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Position {
     q: Few<f64>,
     program: Few<f64>,
+}
+
+impl Clone for Position {
+    /// As wholes, and not one number after the other.
+    fn clone(&self) -> Self {
+        Position { q: Few::from_slice(&self.q), program: Few::from_slice(&self.program) }
+    }
 }
 
 impl Position {

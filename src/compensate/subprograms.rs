@@ -73,6 +73,11 @@ fn o_word(text: &str) -> Option<(String, String)> {
     Some((name, word.to_ascii_uppercase()))
 }
 
+/// Whether a line may bear the name of a program: a look at all of it, which takes many bytes at a time.
+fn may_name(bytes: &[u8]) -> bool {
+    bytes.iter().fold(false, |found, b| found | matches!(b, b'O' | b'o' | b':'))
+}
+
 /// What a line is for sub-programs.
 fn mark(block: &Block, dialect: Dialect) -> Mark {
     if dialect != Dialect::Rs274 {
@@ -177,7 +182,7 @@ impl SubPrograms {
     ) -> Result<()> {
         let dialect = follower.program().dialect();
         // Without sub-programs only the name of the program itself is no block.
-        if self.bodies.is_empty() && !block.bytes().iter().any(|b| matches!(b, b'O' | b'o' | b':')) {
+        if self.bodies.is_empty() && !may_name(block.bytes()) {
             return follower.block(block, out);
         }
         let (name, times) = match mark(block, dialect) {

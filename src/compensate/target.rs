@@ -8,7 +8,7 @@ use super::places::Places;
 use super::refusal::refuse;
 use crate::error::Result;
 use crate::few::Few;
-use crate::nc::{Block, Dialect, Distance, How, Modes, Motion, MotionKind, Value};
+use crate::nc::{Block, Dialect, Distance, How, Modes, Motion, MotionKind, Value, Word};
 
 /// What a word means, modes included.
 pub(super) fn meaning(how: How, modes: &Modes) -> How {
@@ -21,7 +21,14 @@ pub(super) fn meaning(how: How, modes: &Modes) -> How {
 
 /// Refuses words that say where the block goes in a way that is not followed.
 pub(super) fn check(block: &Block, motion: &Motion, control: &Control, dialect: Dialect) -> Result<()> {
-    for word in block.words() {
+    let straight = matches!(motion.kind, MotionKind::Rapid | MotionKind::Linear | MotionKind::Unstated);
+    // A single letter is none of these but I, J and K.
+    let vectors = dialect == Dialect::Rs274 && control.tcp() && straight;
+    let may_tell = |word: &&Word| match word.address.letter() {
+        Some(letter) => vectors && matches!(letter, b'I'..=b'K'),
+        None => true,
+    };
+    for word in block.words().iter().filter(may_tell) {
         let address = word.address.as_str();
         let polar = match dialect {
             Dialect::Siemens => matches!(address, "AP" | "RP"),
@@ -34,9 +41,7 @@ pub(super) fn check(block: &Block, motion: &Motion, control: &Control, dialect: 
         }
         let vector =
             matches!(address, "A2" | "B2" | "C2" | "A3" | "B3" | "C3" | "LEAD" | "TILT" | "TX" | "TY" | "TZ");
-        let straight = matches!(motion.kind, MotionKind::Rapid | MotionKind::Linear | MotionKind::Unstated);
-        let by_ijk =
-            dialect == Dialect::Rs274 && control.tcp() && straight && matches!(address, "I" | "J" | "K");
+        let by_ijk = vectors && matches!(address, "I" | "J" | "K");
         let followed = || control.axes().iter().any(|a| a.address() == address);
         if ((vector && dialect != Dialect::Rs274) || by_ijk) && !followed() {
             let address = address.to_string();
@@ -67,17 +72,17 @@ pub(super) fn of(
         };
         let value = control.si(i, number.value);
         let now = target[i];
-        let upward = (value - now).rem_euclid(TAU);
+        // Within a turn, the way that the word says.
+        let upward = || (value - now).rem_euclid(TAU);
         target[i] = match meaning(word.how, modes) {
             How::Incremental if !places.is_placed(i) => {
                 let fault = CompensateFault::UnknownStart { address: address() };
                 return refuse(block, word.span.start, fault);
             }
             How::Incremental => now + value,
-            // Within a turn, the way that the word says.
-            How::Shortest if upward > 0.5 * TAU => now + upward - TAU,
-            How::Shortest | How::Positive => now + upward,
-            How::Negative if upward > 0.0 => now + upward - TAU,
+            How::Shortest if upward() > 0.5 * TAU => now + upward() - TAU,
+            How::Shortest | How::Positive => now + upward(),
+            How::Negative if upward() > 0.0 => now + upward() - TAU,
             How::Negative => now,
             _ => value,
         };

@@ -25,14 +25,16 @@ impl Ways {
         let axes = || control.axes().iter().enumerate();
         // Where the tip is programmed, the places of the linear joints follow from all of its words. A rotary axis that the
         // program has not named is taken as standing at zero until it does.
-        let tip = axes().all(|(i, axis)| match (axis.tip(), axis.is_rotary()) {
-            (Some(_), _) => places.is_sure(i),
-            (None, true) => places.is_sure(i) || !places.is_parked(i),
-            (None, false) => true,
-        });
-        let turned = axes().any(|(i, axis)| axis.is_rotary() && places.is_sure(i) && !self.sure[i]);
+        let tip = control.tcp()
+            && axes().all(|(i, axis)| match (axis.tip(), axis.is_rotary()) {
+                (Some(_), _) => places.is_sure(i),
+                (None, true) => places.is_sure(i) || !places.is_parked(i),
+                (None, false) => true,
+            });
+        let turned =
+            control.tcp() && axes().any(|(i, axis)| axis.is_rotary() && places.is_sure(i) && !self.sure[i]);
         let mut known = Few::from_elem(false, self.known.len());
-        let mut ways = known.clone();
+        let mut ways = Few::from_slice(&known);
         for (i, axis) in axes() {
             let Some((c, _)) = axis.command() else { continue };
             let by_tip = control.tcp() && axis.tip().is_some();

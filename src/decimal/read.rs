@@ -5,11 +5,10 @@
 //! Lemire, "Number parsing at a gigabyte per second" (2021): the digits times a power of ten of 128 bits decide it, but where they do not,
 //! and there the standard library is asked.
 
-/// Powers of ten that are exact.
-const TENS: [f64; 23] = [
-    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18,
-    1e19, 1e20, 1e21, 1e22,
-];
+use super::TENS;
+
+/// What a number grows by where so many digits follow.
+const SHIFTS: [u64; 9] = [1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
 
 /// Most decimals: `5^27` is the largest power of five that 64 bits hold.
 const MOST_DECIMALS: usize = 27;
@@ -69,11 +68,13 @@ pub(crate) fn read(text: &[u8], at: usize) -> Option<(f64, usize)> {
 /// Digits from byte `at` on, behind those of `mantissa`, and the byte behind them; of more than 19 nothing but their number is right.
 #[inline]
 fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
-    while let Some(eight) =
-        text.get(at..at + 8).and_then(|bytes| bytes.try_into().ok()).and_then(eight_digits)
-    {
-        mantissa = mantissa.wrapping_mul(100_000_000).wrapping_add(eight);
-        at += 8;
+    while let Some(bytes) = text.get(at..at + 8).and_then(|bytes| bytes.try_into().ok()) {
+        let (count, value) = up_to_eight(bytes);
+        mantissa = mantissa.wrapping_mul(SHIFTS[count]).wrapping_add(value);
+        at += count;
+        if count < 8 {
+            return (mantissa, at);
+        }
     }
     while let Some(byte) = text.get(at).filter(|byte| byte.is_ascii_digit()) {
         mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(byte - b'0'));
@@ -82,19 +83,23 @@ fn digits(text: &[u8], mut at: usize, mut mantissa: u64) -> (u64, usize) {
     (mantissa, at)
 }
 
-/// Eight digits at a time, if they are.
+/// How many digits there are before any other byte, and the number that they make: all at a time, so that nothing has to be guessed of
+/// how many there will be.
 #[inline]
-fn eight_digits(bytes: [u8; 8]) -> Option<u64> {
-    let word = u64::from_le_bytes(bytes);
-    let digits = word.wrapping_sub(0x3030_3030_3030_3030);
-    // A byte above '9' overflows into its first bit, one below '0' has it.
-    if (word.wrapping_add(0x4646_4646_4646_4646) | digits) & 0x8080_8080_8080_8080 != 0 {
-        return None;
+fn up_to_eight(bytes: [u8; 8]) -> (usize, u64) {
+    let digits = u64::from_le_bytes(bytes) ^ 0x3030_3030_3030_3030;
+    // Ten and more overflow into the first bit of their byte; what that does to bytes behind the first of them does not matter.
+    let others = (digits.wrapping_add(0x7676_7676_7676_7676) | digits) & 0x8080_8080_8080_8080;
+    let count = (others.trailing_zeros() / 8) as usize;
+    if count == 0 {
+        return (0, 0);
     }
+    // Zeros before them make eight.
+    let digits = digits << (64 - 8 * count);
     // Pairs, fours, all eight.
     let pairs = digits.wrapping_mul(10).wrapping_add(digits >> 8) & 0x00ff_00ff_00ff_00ff;
     let fours = pairs.wrapping_mul(100).wrapping_add(pairs >> 16) & 0x0000_ffff_0000_ffff;
-    Some(fours.wrapping_mul(10_000).wrapping_add(fours >> 32) & 0xffff_ffff)
+    (count, fours.wrapping_mul(10_000).wrapping_add(fours >> 32) & 0xffff_ffff)
 }
 
 /// `mantissa / 10^decimals`, rounded to the nearest, a tie to the even one; `None` where 128 bits do not decide it.

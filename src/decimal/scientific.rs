@@ -2,6 +2,8 @@
 
 use std::io::Write;
 
+use super::PAIRS;
+
 /// Most digits behind the point.
 const MOST: usize = 15;
 
@@ -17,19 +19,6 @@ const fn powers<const N: usize>(base: u64) -> [u64; N] {
     let mut k = 1;
     while k < N {
         all[k] = base * all[k - 1];
-        k += 1;
-    }
-    all
-}
-
-/// Two digits at a time.
-const PAIRS: [[u8; 2]; 100] = pairs();
-
-const fn pairs() -> [[u8; 2]; 100] {
-    let mut all = [[0; 2]; 100];
-    let mut k = 0;
-    while k < 100 {
-        all[k] = [b'0' + (k / 10) as u8, b'0' + (k % 10) as u8];
         k += 1;
     }
     all

@@ -28,20 +28,20 @@ pub struct Foreseen {
     pub solution: Solution,
 }
 
-/// [`Inverse::solve`] for every goal that the nominal machine reaches with its commands at `meant`, begun there with all commands free;
-/// `None` where it takes a closer look.
+/// [`Inverse::solve`] for every goal that the nominal machine reaches with its commands at `meant`, begun there with all commands free, in
+/// this order; without those that take a closer look.
 pub fn foresee(
     inverse: &Inverse,
     (nominal, actual): (&Chain<f64>, &Chain<f64>),
     t_from_tip: Pose<f64>,
     meant: &[Few<f64>],
-) -> Vec<Option<Foreseen>> {
+) -> Vec<Foreseen> {
     let commands = inverse.machine.commands().len();
     let slides: Few<usize> = (0..commands).filter(|c| inverse.is_slide(*c)).collect();
     let (Mode::PositionAndAxis, true, [x, y, z]) = (inverse.mode, inverse.by_slides, &slides[..]) else {
-        return vec![None; meant.len()];
+        return Vec::new();
     };
-    let mut found = vec![None; meant.len()];
+    let mut found = Vec::with_capacity(meant.len());
     let slides = [*x, *y, *z];
     let (nominal, actual) = (nominal.path(), actual.path());
     Arch::new().dispatch(Many { inverse, nominal, actual, t_from_tip, slides, meant, found: &mut found });
@@ -70,7 +70,7 @@ struct Many<'a> {
     t_from_tip: Pose<f64>,
     slides: [usize; 3],
     meant: &'a [Few<f64>],
-    found: &'a mut [Option<Foreseen>],
+    found: &'a mut Vec<Foreseen>,
 }
 
 /// What is left of the goals: m, and a turn with its length, rad.
@@ -112,7 +112,7 @@ impl WithSimd for Many<'_> {
         let mut velocities = vec![Twist::zero(none); joints];
         let mut speeds = vec![Twist::zero(none); commands];
         let mut column = [0.0; MOST_LANES];
-        for (meant, found) in self.meant.chunks(count).zip(self.found.chunks_mut(count)) {
+        for meant in self.meant.chunks(count) {
             for (c, q) in q.iter_mut().enumerate() {
                 // Lanes behind the last goal have that one once more.
                 for (k, x) in column[..count].iter_mut().enumerate() {
@@ -202,7 +202,7 @@ impl WithSimd for Many<'_> {
             for (q, to) in q.iter().zip(&mut to) {
                 q.store(&mut to[..count]);
             }
-            for (k, (meant, found)) in meant.iter().zip(found).enumerate() {
+            for (k, meant) in meant.iter().enumerate() {
                 let commands: Vec<f64> = to.iter().map(|column| column[k]).collect();
                 // What is no number is far as well.
                 let is_there = far[k] < 0.5 && gap[k] < CLOSE;
@@ -211,8 +211,8 @@ impl WithSimd for Many<'_> {
                 }
                 let row = |r: usize| [poses[3 * r][k], poses[3 * r + 1][k], poses[3 * r + 2][k]];
                 let w_from_tip = Pose { rotation: Mat3([row(0), row(1), row(2)]), translation: Vec3(row(3)) };
-                *found = Some(Foreseen {
-                    meant: meant.clone(),
+                self.found.push(Foreseen {
+                    meant: Few::from_slice(meant),
                     goal: Goal { t_from_tip: self.t_from_tip, w_from_tip },
                     solution: Solution {
                         commands,

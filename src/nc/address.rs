@@ -1,12 +1,19 @@
 //! The address of a word.
 
-use std::borrow::Cow;
 use std::fmt;
 use std::ops::Deref;
 
-/// An address in upper case, with its index: `X`, `C1`, `_X_HOME`. One of a single letter, as nearly all are, takes no memory.
+/// An address in upper case, with its index: `X`, `C1`, `_X_HOME`. One of a single letter, as nearly all are, takes no memory and is
+/// compared by its byte.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Address(Cow<'static, str>);
+pub struct Address(Form);
+
+#[derive(Clone, PartialEq, Eq)]
+enum Form {
+    /// In upper case.
+    Letter(u8),
+    Text(Box<str>),
+}
 
 const LETTERS: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZ";
 
@@ -14,17 +21,28 @@ impl Address {
     /// From bytes as a program has them.
     pub(super) fn new(bytes: &[u8]) -> Self {
         match bytes {
-            [letter] if letter.is_ascii_alphabetic() => {
-                let at = usize::from(letter.to_ascii_uppercase() - b'A');
-                Address(Cow::Borrowed(&LETTERS[at..=at]))
-            }
-            _ => Address(Cow::Owned(String::from_utf8_lossy(bytes).to_ascii_uppercase())),
+            [letter] if letter.is_ascii_alphabetic() => Address(Form::Letter(letter.to_ascii_uppercase())),
+            _ => Address(Form::Text(String::from_utf8_lossy(bytes).to_ascii_uppercase().into())),
         }
     }
 
     /// As text.
     pub fn as_str(&self) -> &str {
-        &self.0
+        match &self.0 {
+            Form::Letter(letter) => {
+                let at = usize::from(letter - b'A');
+                &LETTERS[at..=at]
+            }
+            Form::Text(text) => text,
+        }
+    }
+
+    /// The letter, if it is one alone.
+    pub fn letter(&self) -> Option<u8> {
+        match self.0 {
+            Form::Letter(letter) => Some(letter),
+            Form::Text(_) => None,
+        }
     }
 }
 
@@ -32,36 +50,42 @@ impl Deref for Address {
     type Target = str;
 
     fn deref(&self) -> &str {
-        &self.0
+        self.as_str()
     }
 }
 
 impl PartialEq<str> for Address {
+    #[inline]
     fn eq(&self, other: &str) -> bool {
-        self.0 == other
+        match &self.0 {
+            Form::Letter(letter) => matches!(other.as_bytes(), [only] if only == letter),
+            Form::Text(text) => **text == *other,
+        }
     }
 }
 
 impl PartialEq<&str> for Address {
+    #[inline]
     fn eq(&self, other: &&str) -> bool {
-        self.0 == *other
+        *self == **other
     }
 }
 
 impl PartialEq<String> for Address {
+    #[inline]
     fn eq(&self, other: &String) -> bool {
-        self.0 == *other
+        *self == **other
     }
 }
 
 impl fmt::Display for Address {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(&self.0)
+        f.pad(self.as_str())
     }
 }
 
 impl fmt::Debug for Address {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        fmt::Debug::fmt(&*self.0, f)
+        fmt::Debug::fmt(self.as_str(), f)
     }
 }

@@ -34,8 +34,21 @@ impl Block {
     }
 
     pub(crate) fn of_file(file: Arc<Path>, line: usize, bytes: Vec<u8>, dialect: Dialect) -> Block {
-        let (tokens, words) = Cutter::cut(&bytes, dialect);
+        let (tokens, words) = Cutter::cut(&bytes, dialect, (Vec::new(), Vec::new()));
         Block { file, line, bytes, tokens, words, edits: Vec::new(), patches: String::new() }
+    }
+
+    /// Another line of the same file in the memory of this block.
+    pub(super) fn reread(&mut self, line: usize, bytes: Vec<u8>, dialect: Dialect) {
+        self.restore();
+        let pieces = (std::mem::take(&mut self.tokens), std::mem::take(&mut self.words));
+        (self.tokens, self.words) = Cutter::cut(&bytes, dialect, pieces);
+        (self.line, self.bytes) = (line, bytes);
+    }
+
+    /// The bytes of a block that is read anew next.
+    pub(super) fn take_bytes(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.bytes)
     }
 
     /// Takes numbers without a point at these addresses as counts of a least increment of 0.001 mm or 0.001 deg.
@@ -80,9 +93,9 @@ impl Block {
     /// Whether the line has nothing but block numbers, words of axes and feeds, and `G0` or `G1`: all that it can change are where axes are,
     /// the motion and the feed.
     pub(crate) fn is_plain_motion(&self) -> bool {
-        let is_plain = |word: &Word| match (word.address.as_str(), word.value) {
-            ("X" | "Y" | "Z" | "A" | "B" | "C" | "U" | "V" | "W" | "F", Value::Number(_)) => true,
-            ("G", Value::Number(number)) => matches!(number.value, 0.0 | 1.0),
+        let is_plain = |word: &Word| match (word.address.letter(), word.number()) {
+            (Some(b'X'..=b'Z' | b'A'..=b'C' | b'U'..=b'W' | b'F'), Some(_)) => true,
+            (Some(b'G'), Some(code)) => matches!(code, 0.0 | 1.0),
             _ => false,
         };
         self.tokens.iter().all(|token| match token.kind {

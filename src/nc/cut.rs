@@ -24,10 +24,17 @@ pub(super) struct Cutter<'a> {
 }
 
 impl Cutter<'_> {
-    /// Tokens and words of a line, with or without its line end.
-    pub fn cut(bytes: &[u8], dialect: Dialect) -> (Vec<Token>, Vec<Word>) {
+    /// Tokens and words of a line, with or without its line end; in the memory of those of another line.
+    pub fn cut(
+        bytes: &[u8],
+        dialect: Dialect,
+        (mut tokens, mut words): (Vec<Token>, Vec<Word>),
+    ) -> (Vec<Token>, Vec<Word>) {
         let line = Line::new(bytes, dialect);
-        let (tokens, words) = (Vec::with_capacity(ORDINARY), Vec::with_capacity(ORDINARY));
+        tokens.clear();
+        tokens.reserve(ORDINARY);
+        words.clear();
+        words.reserve(ORDINARY);
         let mut cutter = Cutter { line, at: 0, tokens, words, unbalanced: false };
         if bytes.starts_with(b"\xef\xbb\xbf") {
             cutter.at = 3;

@@ -10,8 +10,6 @@ pub struct Motion {
     pub line: usize,
     /// How it moves.
     pub kind: MotionKind,
-    /// Where it starts, programmed units; `None` where that is not known.
-    pub start: Vec<Option<f64>>,
     /// Where it ends, absolute, programmed units, with the axes that the block does not name; `None` where that is not known.
     pub target: Vec<Option<f64>>,
     /// Which of [`Block::words`](super::Block::words) gave which axis.

@@ -1,7 +1,7 @@
 //! Numbers as a program writes them: the value, and the habits of who wrote it.
 
 use super::dialect::Dialect;
-use crate::decimal;
+use crate::decimal::{self, Text};
 
 /// Most digits behind the point that are ever written.
 pub(super) const MOST_DECIMALS: usize = 300;
@@ -36,8 +36,24 @@ impl Number {
     pub(super) fn at_start(text: &[u8], dialect: Dialect) -> Option<(Number, usize)> {
         let heidenhain = dialect == Dialect::Heidenhain;
         let sign = text.first().filter(|b| matches!(b, b'+' | b'-')).copied();
-        let digits = |from: usize| text[from..].iter().take_while(|b| b.is_ascii_digit()).count();
         let start = usize::from(sign.is_some());
+        let padded = |whole: usize| whole > 1 && text[start] == b'0';
+        let plus = sign == Some(b'+') || (heidenhain && sign == Some(b'-'));
+        if let Some((value, length)) = plain_value(&text[start..], heidenhain) {
+            let point = text[start..start + length].iter().position(|b| *b == b'.');
+            let whole = point.unwrap_or(length);
+            let number = Number {
+                value: if sign == Some(b'-') { -value } else { value },
+                decimals: point.map_or(0, |point| length - point - 1),
+                whole,
+                has_point: point.is_some(),
+                padded: padded(whole),
+                plus,
+                comma: false,
+            };
+            return Some((number, start + length));
+        }
+        let digits = |from: usize| text[from..].iter().take_while(|b| b.is_ascii_digit()).count();
         let whole = digits(start);
         let mut end = start + whole;
         let (mut decimals, mut has_point, mut comma) = (0, false, false);
@@ -53,9 +69,7 @@ impl Number {
             return None;
         }
         let value = value_of(&text[start..end], sign == Some(b'-'))?;
-        let padded = whole > 1 && text[start] == b'0';
-        let plus = sign == Some(b'+') || (heidenhain && sign == Some(b'-'));
-        Some((Number { value, decimals, whole, has_point, padded, plus, comma }, end))
+        Some((Number { value, decimals, whole, has_point, padded: padded(whole), plus, comma }, end))
     }
 
     /// The number where it counts least increments of this size, if it has no point: such a count is written with one from then on.
@@ -70,6 +84,26 @@ impl Number {
     /// Never an exponent, never a negative zero. A value without decimals gets no point that the source does not have.
     /// `value`: programmed units, finite (of another one comes a text that [`Block::replace`](super::Block::replace) refuses).
     pub fn write_like(&self, value: f64, decimals: Option<usize>) -> String {
+        match self.rounded_like(value, decimals) {
+            Some((text, _)) => String::from_utf8_lossy(&text).into_owned(),
+            None => self.write_with_care(value, decimals),
+        }
+    }
+
+    /// As [`Number::write_like`], with the value that the text has; `None` where it takes more than to round a number of few digits.
+    pub(crate) fn rounded_like(&self, value: f64, decimals: Option<usize>) -> Option<(Text, f64)> {
+        if self.padded || self.comma {
+            return None;
+        }
+        let places = self.decimals.max(decimals.unwrap_or(0));
+        let size = decimal::Rounded::of(value.abs(), places)?.shortened(self.decimals);
+        let negative = value < 0.0 && !size.is_zero();
+        let sign = if negative { Some(b'-') } else { self.plus.then_some(b'+') };
+        let text = size.text(sign, self.has_point, self.whole > 0);
+        Some((text, if negative { -size.value() } else { size.value() }))
+    }
+
+    fn write_with_care(&self, value: f64, decimals: Option<usize>) -> String {
         let places = self.decimals.max(decimals.unwrap_or(0)).min(MOST_DECIMALS);
         let mut digits = decimal::fixed(value.abs(), places);
         if !value.is_finite() {
@@ -105,6 +139,14 @@ impl Number {
     }
 }
 
+/// The value of the plain decimal that `text`, without sign, starts with, and how many bytes it has.
+fn plain_value(text: &[u8], heidenhain: bool) -> Option<(f64, usize)> {
+    let is_unsigned = text.first().is_some_and(|b| *b != b'-');
+    let (value, length) = decimal::read(text, 0).filter(|_| is_unsigned)?;
+    // A comma may be the point.
+    (!heidenhain || text.get(length) != Some(&b',')).then_some((value, length))
+}
+
 /// The value of digits with at most one point or comma among them.
 fn value_of(text: &[u8], negative: bool) -> Option<f64> {
     let plain = decimal::read(text, 0).filter(|(_, end)| *end == text.len());
@@ -129,6 +171,22 @@ mod tests {
             let exact: Option<f64> = text.parse().ok();
             let read = Number::parse(text.as_bytes(), Dialect::Rs274).map(|n| n.value);
             prop_assert_eq!(read.map(f64::to_bits), exact.map(f64::to_bits));
+        }
+
+        #[test]
+        fn numbers_of_few_digits_are_written_as_any(
+            like in "[+-]?[0-9]{0,3}\\.?[0-9]{0,5}",
+            value in prop_oneof![-1e4..1e4f64, -1e-3..1e-3f64, (-2000i32..2000).prop_map(|n| f64::from(n) / 1e3)],
+            decimals in proptest::option::of(0usize..8),
+        ) {
+            for dialect in [Dialect::Rs274, Dialect::Heidenhain] {
+                let Some(number) = Number::parse(like.as_bytes(), dialect) else { continue };
+                if let Some((text, written)) = number.rounded_like(value, decimals) {
+                    prop_assert_eq!(String::from_utf8_lossy(&text), number.write_with_care(value, decimals));
+                    let read = Number::parse(&text, dialect).map(|n| n.value.to_bits());
+                    prop_assert_eq!(read, Some(written.to_bits()));
+                }
+            }
         }
     }
 }

@@ -61,8 +61,9 @@ impl<R: BufRead> Program<R> {
         let mut program = Program::with_dialect(file, source, Dialect::default());
         let mut bytes = 0;
         while program.head.len() < HEAD_LINES && bytes < HEAD_BYTES {
-            match program.read_line() {
-                Ok(Some(line)) => {
+            let mut line = Vec::new();
+            match program.read_line(&mut line) {
+                Ok(true) => {
                     bytes += line.len();
                     let told = Dialect::of_line(&line);
                     program.head.push_back(line);
@@ -71,7 +72,7 @@ impl<R: BufRead> Program<R> {
                         break;
                     }
                 }
-                Ok(None) => break,
+                Ok(false) => break,
                 Err(stop) => {
                     program.stop = Some(stop);
                     break;
@@ -122,7 +123,19 @@ impl<R: BufRead> Program<R> {
     /// # Errors
     /// [`NcFault::LineTooLong`] with its line, [`Error::File`].
     pub fn next_block(&mut self) -> Result<Option<Block>> {
-        Ok(self.next_line()?.map(|bytes| self.block_of(bytes)))
+        let mut bytes = Vec::with_capacity(ORDINARY_LINE);
+        Ok(self.next_line(&mut bytes)?.then(|| self.block_of(bytes)))
+    }
+
+    /// As [`Program::next_block`], in the memory of a block of this program that is done with.
+    pub(crate) fn next_block_over(&mut self, mut block: Block) -> Result<Option<Block>> {
+        let mut bytes = block.take_bytes();
+        if !self.next_line(&mut bytes)? {
+            return Ok(None);
+        }
+        block.reread(self.line, bytes, self.dialect);
+        block.count_increments(self.increments);
+        Ok(Some(block))
     }
 
     /// The line that was returned last as a block.
@@ -137,24 +150,27 @@ impl<R: BufRead> Program<R> {
         self.line
     }
 
-    /// The bytes of the next block; otherwise as [`Program::next_block`].
-    pub(crate) fn next_line(&mut self) -> Result<Option<Vec<u8>>> {
+    /// The bytes of the next block in the place of others; whether there is one. Otherwise as [`Program::next_block`].
+    pub(crate) fn next_line(&mut self, line: &mut Vec<u8>) -> Result<bool> {
         if self.ended {
-            return Ok(None);
+            return Ok(false);
         }
-        let line = match (self.head.pop_front(), &self.stop) {
-            (Some(line), _) => Ok(Some(line)),
-            (None, Some(_)) => self.stop.take().map_or(Ok(None), Err),
-            (None, None) => self.read_line(),
+        let is_there = match (self.head.pop_front(), &self.stop) {
+            (Some(first), _) => {
+                *line = first;
+                Ok(true)
+            }
+            (None, Some(_)) => self.stop.take().map_or(Ok(false), Err),
+            (None, None) => self.read_line(line),
         };
-        self.ended = !matches!(line, Ok(Some(_)));
+        self.ended = !matches!(is_there, Ok(true));
         self.line += 1;
-        line
+        is_there
     }
 
-    /// The next line with its line end.
-    fn read_line(&mut self) -> Result<Option<Vec<u8>>> {
-        let mut line = Vec::with_capacity(ORDINARY_LINE);
+    /// The next line with its line end in the place of another; whether there is one.
+    fn read_line(&mut self, line: &mut Vec<u8>) -> Result<bool> {
+        line.clear();
         loop {
             let part = match self.source.fill_buf() {
                 Ok(part) => part,
@@ -176,10 +192,10 @@ impl<R: BufRead> Program<R> {
             }
         }
         if line.is_empty() {
-            return Ok(None);
+            return Ok(false);
         }
         self.read += 1;
-        Ok(Some(line))
+        Ok(true)
     }
 }
 

@@ -12,7 +12,9 @@ use super::modes::{Coordinate, Modes, MotionKind, Why};
 use super::motion::{Motion, Step};
 use super::token::Kind;
 use super::unfollowed::{Known, unknown_functions};
+use super::vocabulary::Action;
 use crate::error::Result;
+use crate::few::Few;
 
 /// Modal state of a program, followed block by block.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +94,41 @@ impl State {
         Ok(reading.step)
     }
 
+    /// The short way through [`State::apply`] for a block that can change no more than where axes are, the motion and the feed, and where
+    /// none is called behind blocks that move: how it moves, if it does. `None`, and nothing changed, where it takes the long way to tell.
+    pub(crate) fn apply_plain(&mut self, block: &Block) -> Option<Option<Motion>> {
+        let vocabulary = vocabulary(self.dialect);
+        let (mut words, mut stated) = (vec![None; self.axes.addresses().len()], None);
+        let mut moves = false;
+        for (index, word) in block.words().iter().enumerate() {
+            if word.address == "F" {
+                continue;
+            }
+            if word.address == "G" {
+                let Some(Action::Motion(kind)) = vocabulary.g(word.number()?) else { return None };
+                stated = Some(kind);
+                continue;
+            }
+            let axis = self.axes.addresses().iter().position(|address| word.address == *address)?;
+            if words[axis].replace(index).is_some() {
+                return None;
+            }
+            moves = true;
+        }
+        let kind = stated.or(self.modes.motion).unwrap_or(MotionKind::Unstated);
+        if kind == MotionKind::Cycle {
+            return None;
+        }
+        self.modes.motion = stated.or(self.modes.motion);
+        let line = block.line();
+        for (axis, word) in words.iter().enumerate() {
+            if let Some(word) = *word {
+                self.axes.go(axis, &block.words()[word], &self.modes, line);
+            }
+        }
+        Some(moves.then(|| Motion { line, kind, target: self.target(), words, machine_frame: false }))
+    }
+
     /// Takes up what a declaration names.
     fn declare(&mut self, block: &Block) {
         let mut tokens = block.tokens().iter();
@@ -108,7 +145,7 @@ impl State {
     }
 
     /// The words of the block that name axis after axis.
-    fn axis_words(&self, block: &Block) -> Vec<Named> {
+    fn axis_words(&self, block: &Block) -> Few<Named> {
         let of = |address: &String| {
             let mut named = (0..block.words().len()).filter(|i| block.words()[*i].address == *address);
             Named { first: named.next(), second: named.next() }
@@ -155,7 +192,6 @@ impl State {
         if !(words.iter().any(|named| named.first.is_some()) || by_polar || by_direction || by_centre) {
             return;
         }
-        let start = self.target();
         for axis in 0..words.len() {
             if let Some(word) = named(axis) {
                 self.axes.go(axis, &block.words()[word], &self.modes, line);
@@ -188,7 +224,7 @@ impl State {
         }
         let words = words.iter().map(|named| named.first).collect();
         let machine_frame = reading.machine_frame;
-        reading.step.motion = Some(Motion { line, kind, start, target, words, machine_frame });
+        reading.step.motion = Some(Motion { line, kind, target, words, machine_frame });
     }
 }
 
@@ -202,4 +238,39 @@ struct Named {
 /// The axis that two words name, and these words.
 fn twice(words: &[Named]) -> Option<(usize, usize, usize)> {
     words.iter().enumerate().find_map(|(axis, named)| Some((axis, named.first?, named.second?)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_short_way_is_as_the_long_one() {
+        let program = "G21 G90\nG1 X1 Y2 F100\nX3 A-4\nF20\nG0\nG91\nX1 Z.5\nG90 X5\nX#1\nX2\nX1 X2\nW3\nG81 X1 R2 Z-3\nX4\nG80\nZ1\nG2 X1 Y1 R5\nX2\nQ1\n";
+        for dialect in [Dialect::Rs274, Dialect::Siemens, Dialect::Heidenhain] {
+            let mut long = State::new(dialect, ["X", "Y", "Z", "A"]);
+            let mut taken = 0;
+            for (line, text) in program.lines().enumerate() {
+                let block = Block::new(line + 1, text.as_bytes(), dialect);
+                let (before, mut short) = (long.clone(), long.clone());
+                let step = long.apply(&block);
+                if !block.is_plain_motion() || before.modes.modal_call {
+                    continue;
+                }
+                match short.apply_plain(&block) {
+                    Some(motion) => {
+                        taken += 1;
+                        assert_eq!(
+                            Ok(Step { motion, ..Step::default() }),
+                            step.map_err(|e| e.to_string()),
+                            "{text}"
+                        );
+                        assert_eq!(short, long, "{text}");
+                    }
+                    None => assert_eq!(short, before, "{text}"),
+                }
+            }
+            assert!(taken > 5, "{dialect:?}: {taken}");
+        }
+    }
 }

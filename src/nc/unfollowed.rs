@@ -106,7 +106,7 @@ impl Known<'_> {
             }
             _ => {}
         }
-        if self.axes.iter().any(|axis| axis == address)
+        if self.axes.iter().any(|axis| word.address == *axis)
             || self.vocabulary.has_address(address)
             || self.declared.contains(address)
         {

@@ -25,7 +25,6 @@ fn modal_coordinates_and_motions_are_followed() {
     assert_eq!(motion(3).target, [Some(3.0), Some(2.0), Some(-0.5), None]);
     assert_eq!((motion(3).kind, &motion(3).words), (MotionKind::Linear, &vec![Some(0), None, None, None]));
     assert_eq!(motion(4).target, [Some(4.0), Some(1.0), Some(-0.5), None]);
-    assert_eq!(motion(5).start, motion(4).target);
     assert_eq!((motion(7).kind, motion(7).words.clone()), (MotionKind::ArcCcw, vec![None; 4]));
     assert_eq!(motion(8).target[1], None);
     assert_eq!(motion(9).target, [Some(9.0), Some(1.0), Some(-0.5), None]);
