@@ -92,7 +92,7 @@ use crate::identify::CalibrateOptions;
 use crate::machine::Machine;
 use crate::recording::Recording;
 use not_tried::not_tried;
-use rounds::{Case, Told};
+use rounds::{Case, Said};
 use side_branches::unseen;
 
 /// What a diagnosis is asked.
@@ -157,7 +157,7 @@ fn search_all(
     let candidates = library.candidates(machine, &facts);
     let (options, propose) = (request.options, request.propose);
     let case = Case { machine, recordings, library, facts: &facts, options, propose, progress };
-    let Told { mut diagnosis, may_be_late } = case.told(&candidates.all)?;
+    let Said { mut diagnosis, may_be_late } = case.told(&candidates.all)?;
     if let Some(joint) = may_be_late {
         progress("looking at it as at an axis that is late");
         let other = case.told(&lag::but_late(&candidates.all, joint))?.diagnosis;

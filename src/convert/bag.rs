@@ -79,7 +79,7 @@ pub(super) fn read(
     let mut told = chosen.told;
     told.extend(bag.lost.clone());
     let (topic, joints) = chosen.joints;
-    let poses = Poses::of(file, &chosen.poses, request, &mut told)?;
+    let poses = poses_of(file, &chosen.poses, request, &mut told)?;
     if joints.without > 0 {
         told.push(format!(
             "{} without positions",
@@ -205,12 +205,7 @@ impl Bagged {
         let mut told = std::mem::take(&mut self.told);
         let repeated: u64 =
             used.iter().map(|(joint, _)| self.joints.tracks[*joint].repeated()).max().unwrap_or(0);
-        if repeated > 0 {
-            told.push(format!(
-                "{} left out of a stamp that a later one has too",
-                count(repeated, "joint state", "joint states")
-            ));
-        }
+        tell_repeated(repeated, ("joint state", "joint states"), &mut told);
         let gap = used.iter().map(|(joint, _)| self.gap(*joint)).max().unwrap_or(0) as f64 * 1e-9;
         let mut line = format!(
             "joint positions at the stamps of poses lie on straight lines between joint states no more than {gap:.4} s apart"
@@ -292,132 +287,118 @@ fn position(track: &Track<f64>, at: i64, longest: i64) -> std::result::Result<(f
 }
 
 /// Poses in the order of time.
-struct Poses;
-
-impl Poses {
-    fn of(
-        file: &Path,
-        source: &Source,
-        request: &Request,
-        told: &mut Vec<String>,
-    ) -> Result<Vec<(i64, Posed)>> {
-        let (all, of, frame, child) = match source {
-            Source::Topic(topic, poses) => {
-                let called = || format!("topic `{}`", shown(&topic.name));
-                check_clock(file, &poses.track, called)?;
-                tell_repeated(&poses.track, told);
-                (poses.track.points().to_vec(), called(), poses.frame.clone(), poses.child.clone())
-            }
-            Source::Frames { parent, child, way } => {
-                let all = Self::along(file, (parent, child), way, request, told)?;
-                (all, "TF".to_string(), parent.to_string(), child.to_string())
-            }
-        };
-        let total = all.len();
-        let given: Vec<_> = all.into_iter().filter(|(_, pose)| pose.is_given()).collect();
-        if given.len() < total {
-            let lost = count((total - given.len()) as u64, "pose", "poses");
-            told.push(format!("{lost} of {total} dropped that are zero or NaN: the target was not seen"));
+fn poses_of(
+    file: &Path,
+    source: &Source,
+    request: &Request,
+    told: &mut Vec<String>,
+) -> Result<Vec<(i64, Posed)>> {
+    let (all, of, frame, child) = match source {
+        Source::Topic(topic, poses) => {
+            let called = || format!("topic `{}`", shown(&topic.name));
+            check_clock(file, &poses.track, called)?;
+            tell_repeated(poses.track.repeated(), ("pose", "poses"), told);
+            (poses.track.points().to_vec(), called(), poses.frame.clone(), poses.child.clone())
         }
-        if given.is_empty() {
-            let what = format!("{of} has no pose that is given: all are zero or NaN");
-            return Err(Error::mistake(
-                Place::file(file),
-                what,
-                "record while the instrument sees its target",
-            ));
+        Source::Frames { parent, child, way } => {
+            let all = poses_along(file, (parent, child), way, request, told)?;
+            (all, "TF".to_string(), parent.to_string(), child.to_string())
         }
-        let child = if child.is_empty() { String::new() } else { format!(" of `{}`", shown(&child)) };
-        told.push(format!(
+    };
+    let total = all.len();
+    let given: Vec<_> = all.into_iter().filter(|(_, pose)| pose.is_given()).collect();
+    if given.len() < total {
+        let lost = count((total - given.len()) as u64, "pose", "poses");
+        told.push(format!("{lost} of {total} dropped that are zero or NaN: the target was not seen"));
+    }
+    if given.is_empty() {
+        let what = format!("{of} has no pose that is given: all are zero or NaN");
+        return Err(Error::mistake(Place::file(file), what, "record while the instrument sees its target"));
+    }
+    let child = if child.is_empty() { String::new() } else { format!(" of `{}`", shown(&child)) };
+    told.push(format!(
             "poses{child} are in frame `{}`, which is taken as frame w of the machine; if nobody knows where that stands, say --head 'workpiece_frame: unknown'",
             shown(&frame)
         ));
-        Ok(given)
-    }
-
-    /// Poses over a way of links, at the stamps of the moving one that comes least often.
-    fn along(
-        file: &Path,
-        (parent, child): (&str, &str),
-        way: &[rosbag::Step],
-        request: &Request,
-        told: &mut Vec<String>,
-    ) -> Result<Vec<(i64, Posed)>> {
-        let moving: Vec<&rosbag::Step> = way.iter().filter(|step| !step.link.is_fixed).collect();
-        let Some(slowest) = moving.iter().min_by_key(|step| step.link.poses.points().len()) else {
-            let what = format!(
-                "frame `{}` does not move in frame `{}`: all between them is fixed",
-                shown(child),
-                shown(parent)
-            );
-            return Err(Error::mistake(
-                Place::file(file),
-                what,
-                "name by --frames a frame that the instrument follows",
-            ));
-        };
-        for step in &moving {
-            check_clock(file, &step.link.poses, || format!("frame `{}` of TF", shown(step.child)))?;
-            tell_repeated(&step.link.poses, told);
-            if step.link.blank > 0 {
-                let lost = count(step.link.blank, "pose", "poses");
-                told.push(format!(
-                    "{lost} of frame `{}` dropped that are zero or NaN: the target was not seen",
-                    shown(step.child)
-                ));
-            }
-        }
-        let gap = |link: &Link| longest(request, &link.poses);
-        let stamps: Vec<i64> = slowest.link.poses.points().iter().map(|(at, _)| *at).collect();
-        let found: Vec<(i64, Posed)> =
-            stamps.iter().filter_map(|at| Some((*at, rosbag::along(way, *at, gap)?))).collect();
-        if way.len() > 1 {
-            let chain: Vec<String> = way
-                .iter()
-                .map(|step| {
-                    format!(
-                        "`{}` in `{}`{}",
-                        shown(step.child),
-                        shown(step.parent),
-                        if step.is_up { ", reversed" } else { "" }
-                    )
-                })
-                .collect();
-            told.push(format!("frames between: {}", chain.join("; ")));
-        }
-        if moving.len() > 1 {
-            told.push(format!(
-                "{} of these links move: poses have the stamps of `{}`, the others are interpolated there",
-                moving.len(),
-                shown(slowest.child)
-            ));
-        }
-        if found.len() < stamps.len() {
-            let lost = count((stamps.len() - found.len()) as u64, "pose", "poses");
-            told.push(format!("{lost} dropped where another link of the chain has none, or a longer gap"));
-        }
-        if found.is_empty() {
-            let what = format!(
-                "the links between `{}` and `{}` share no stretch of time",
-                shown(parent),
-                shown(child)
-            );
-            return Err(Error::mistake(
-                Place::file(file),
-                what,
-                "stamp them by one clock, or allow a longer gap by `--longest-gap`",
-            ));
-        }
-        Ok(found)
-    }
+    Ok(given)
 }
 
-fn tell_repeated<T>(track: &Track<T>, told: &mut Vec<String>) {
-    if track.repeated() > 0 {
-        told.push(format!(
-            "{} left out of a stamp that a later one has too",
-            count(track.repeated(), "pose", "poses")
+/// Poses over a way of links, at the stamps of the moving one that comes least often.
+fn poses_along(
+    file: &Path,
+    (parent, child): (&str, &str),
+    way: &[rosbag::Step],
+    request: &Request,
+    told: &mut Vec<String>,
+) -> Result<Vec<(i64, Posed)>> {
+    let moving: Vec<&rosbag::Step> = way.iter().filter(|step| !step.link.is_fixed).collect();
+    let Some(slowest) = moving.iter().min_by_key(|step| step.link.poses.points().len()) else {
+        let what = format!(
+            "frame `{}` does not move in frame `{}`: all between them is fixed",
+            shown(child),
+            shown(parent)
+        );
+        return Err(Error::mistake(
+            Place::file(file),
+            what,
+            "name by --frames a frame that the instrument follows",
         ));
+    };
+    for step in &moving {
+        check_clock(file, &step.link.poses, || format!("frame `{}` of TF", shown(step.child)))?;
+        tell_repeated(step.link.poses.repeated(), ("pose", "poses"), told);
+        if step.link.blank > 0 {
+            let lost = count(step.link.blank, "pose", "poses");
+            told.push(format!(
+                "{lost} of frame `{}` dropped that are zero or NaN: the target was not seen",
+                shown(step.child)
+            ));
+        }
+    }
+    let gap = |link: &Link| longest(request, &link.poses);
+    let stamps: Vec<i64> = slowest.link.poses.points().iter().map(|(at, _)| *at).collect();
+    let found: Vec<(i64, Posed)> =
+        stamps.iter().filter_map(|at| Some((*at, rosbag::along(way, *at, gap)?))).collect();
+    if way.len() > 1 {
+        let chain: Vec<String> = way
+            .iter()
+            .map(|step| {
+                format!(
+                    "`{}` in `{}`{}",
+                    shown(step.child),
+                    shown(step.parent),
+                    if step.is_up { ", reversed" } else { "" }
+                )
+            })
+            .collect();
+        told.push(format!("frames between: {}", chain.join("; ")));
+    }
+    if moving.len() > 1 {
+        told.push(format!(
+            "{} of these links move: poses have the stamps of `{}`, the others are interpolated there",
+            moving.len(),
+            shown(slowest.child)
+        ));
+    }
+    if found.len() < stamps.len() {
+        let lost = count((stamps.len() - found.len()) as u64, "pose", "poses");
+        told.push(format!("{lost} dropped where another link of the chain has none, or a longer gap"));
+    }
+    if found.is_empty() {
+        let what =
+            format!("the links between `{}` and `{}` share no stretch of time", shown(parent), shown(child));
+        return Err(Error::mistake(
+            Place::file(file),
+            what,
+            "stamp them by one clock, or allow a longer gap by `--longest-gap`",
+        ));
+    }
+    Ok(found)
+}
+
+fn tell_repeated(repeated: u64, (one, many): (&str, &str), told: &mut Vec<String>) {
+    if repeated > 0 {
+        told.push(format!("{} left out of a stamp that a later one has too", count(repeated, one, many)));
     }
 }
 

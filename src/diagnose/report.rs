@@ -10,7 +10,7 @@ use super::finding::{Finding, Meaningless};
 use super::folds;
 use super::held_out::Model;
 use super::marginal::Marginal;
-use super::nameless::{Unexplained, UnnamedPart};
+use super::nameless::{Proposal, Unexplained, UnnamedPart};
 use super::names::LIKELY;
 use super::noise::Noise;
 use super::orders;
@@ -113,20 +113,20 @@ pub(super) fn report(
         .collect();
     // Names that explain most of what is there stand; what they leave may be foretold all the same.
     let is_rest = doubt.is_none() && !told.is_empty() && shares.left.beyond > CHANCE;
-    let names = Names { told, shared_effects, shares, doubt, is_rest, is_proved };
+    let findings = Findings { told, shared_effects, shares, doubt, is_rest, is_proved };
     let given = (machine, library, facts);
-    let (plain, _) = names.with_parts(search, given, noise, None, propose);
+    let (plain, _) = findings.with_parts(search, given, noise, None, propose);
     if !noise.iter().any(Noise::is_long) {
         return plain;
     }
     // A memory longer than instruments have may be what is to be modelled. Stretches that were left out tell.
     let short: Vec<Noise> = noise.iter().map(Noise::shortened).collect();
-    let (shortened, has_parts) = names.with_parts(search, given, noise, Some(&short), propose);
+    let (shortened, has_parts) = findings.with_parts(search, given, noise, Some(&short), propose);
     if has_parts && shortened.foretells_more(&plain) { shortened } else { plain }
 }
 
 /// What is said by name, before what has none is asked for.
-struct Names {
+struct Findings {
     /// In order of evidence.
     told: Vec<Told>,
     /// The same effects at other places.
@@ -139,110 +139,166 @@ struct Names {
     is_proved: bool,
 }
 
-impl Names {
+/// All that the model has beside geometry, and what is said of the rest.
+struct Modelled {
+    told: Vec<Told>,
+    shared_effects: Vec<ModelTerm>,
+    /// Shared effects as they are put into the model.
+    of_shared: Vec<Named>,
+    /// What has no name and is modelled all the same.
+    parts: Vec<ModelTerm>,
+    of_parts: Vec<Named>,
+    unexplained: Option<Unexplained>,
+    proposals: Vec<Proposal>,
+}
+
+impl Findings {
     /// With what has no name modelled all the same, and then asked for its name; whether anything was. `memory`: the noise beside which it
     /// is, if not the search's.
     fn with_parts(
         &self,
         search: &Search,
-        (machine, library, facts): (&Machine, &Library, &RecordingFacts),
+        given: (&Machine, &Library, &RecordingFacts),
         noise: &[Noise],
         memory: Option<&[Noise]>,
         propose: bool,
     ) -> (Diagnosis, bool) {
+        let (machine, library, facts) = given;
         let noise = memory.unwrap_or(noise);
-        let (shares, is_proved) = (&self.shares, self.is_proved);
-        let (mut told, mut shared_effects) = (self.told.clone(), self.shared_effects.clone());
         // What is taken for noise otherwise is a rest, too.
         let is_rest = self.is_rest || memory.is_some() && self.doubt.is_none();
-        let doubt = self.doubt.clone().or_else(|| is_rest.then(|| Doubt::of(shares.left.energy)));
-        let linear = search.rows.linear;
-        // What has no name as it is, is modelled all the same, and then asked for its name.
-        let unnamed = doubt.as_ref().map(|_| Unnamed::beside(search, machine, facts));
-        let wide = unnamed.as_ref().map(|unnamed| unnamed.rows(search, memory));
-        let wide = unnamed.as_ref().zip(wide.as_ref()).map(|(unnamed, rows)| unnamed.search(search, rows));
-        let (narrow, search) = (search, wide.as_ref().unwrap_or(search));
-        let (mut parts, mut of_parts, mut unexplained) = (Vec::new(), Vec::new(), None);
-        let mut of_shared = None;
-        let (mut proposals, mut has_parts) = (Vec::new(), false);
-        if let Some((unnamed, doubt)) = unnamed.as_ref().zip(doubt) {
-            let beside = |term: &ModelTerm| match memory {
-                Some(_) => search.anew(term),
-                None => term.clone(),
-            };
-            let mut of_search: Vec<ModelTerm> = told.iter().map(|told| told.term.clone()).collect();
-            told.iter_mut().for_each(|told| told.term = beside(&told.term));
-            shared_effects.iter_mut().for_each(|term| *term = beside(term));
-            let mut known: Vec<ModelTerm> =
-                told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
-            let (modelled, only_told) = unnamed.parts(search, &known);
-            let naming = unnamed.named(search, &known, modelled.clone());
-            let found: Vec<ModelTerm> =
-                naming.told.iter().map(|given| &given.term).chain(&naming.parts).cloned().collect();
-            let all = [known.as_slice(), &found].concat();
-            let is_modelled = !modelled.is_empty()
-                && folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF);
-            has_parts = is_modelled;
-            // What helped alone may do harm beside them.
-            while let Some(i) = is_modelled
-                .then(|| folds::worst(search, &[known.as_slice(), &found].concat(), told.len()))
-                .flatten()
-            {
-                told.remove(i);
-                of_search.remove(i);
-                shared_effects = shared::effects(narrow, library, &of_search);
-                shared_effects.iter_mut().for_each(|term| *term = beside(term));
-                known = told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
-            }
-            let (naming, only_told) = match is_modelled {
-                true => (naming, Vec::new()),
-                false if is_rest => (naming.withdrawn(), Vec::new()),
-                false => (naming.withdrawn(), modelled.into_iter().chain(only_told).collect()),
-            };
-            for k in 0..naming.told.len() {
-                let others = naming.parts.iter().filter(|part| unnamed.group(part) != naming.told[k].group);
-                let others: Vec<ModelTerm> = known.iter().chain(others).cloned().collect();
-                told.extend(promoted(search, &others, &naming, k, shares, (machine, library)));
-            }
-            told.sort_by(|a, b| b.finding.delta_bic.total_cmp(&a.finding.delta_bic));
-            let known: Vec<ModelTerm> =
-                told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
-            let shown = [naming.parts.as_slice(), &only_told].concat();
-            let all = [known.as_slice(), &shown].concat();
-            // All together: what stands in the model was solved with all that stands there.
-            let mut described = unnamed.told(search, &all, shares, (machine, library), is_modelled);
-            let of_shown = described.split_off(known.len());
-            let (told_terms, rest) = described.split_at(told.len());
-            told.iter_mut().zip(told_terms).for_each(|(told, (_, named))| told.named = named.clone());
-            of_shared = Some(rest.iter().map(|(_, named)| named.clone()).collect::<Vec<Named>>());
-            let names = |term: &ModelTerm| naming.likely(&unnamed.group(term));
-            let rank = |term: &ModelTerm| naming.rank(&unnamed.group(term));
-            let mut shown_parts = Vec::new();
-            for ((part, named), term) in of_shown.into_iter().zip(&shown) {
-                shown_parts.push((rank(term), UnnamedPart { names: names(term), ..part }));
-                if is_modelled {
-                    of_parts.push(named);
-                }
-            }
-            if is_modelled {
-                if propose {
-                    let given = (machine, library, facts);
-                    proposals = propose::proposals(search, unnamed, (&known, &shown), &names, given);
-                }
-                parts = shown;
-            }
-            let found = search.beside_names(&known);
-            let is_named = is_rest || is_proved || !naming.told.is_empty();
-            let doubt = match is_named {
-                true => still(search, &found, doubt, !shown_parts.is_empty()),
-                false => Some(doubt),
-            };
-            let left = if is_named { &found } else { &search.base };
-            unexplained = doubt.map(|doubt| unexplained_by(search, machine, noise, &doubt, left));
-            if let Some(unexplained) = &mut unexplained {
-                unexplained.take(shown_parts);
-            }
+        let doubt = self.doubt.clone().or_else(|| is_rest.then(|| Doubt::of(self.shares.left.energy)));
+        let Some(doubt) = doubt else {
+            let modelled = self.alone(search, (machine, library));
+            return (modelled.diagnosis(search, (machine, library), noise, &self.shares), false);
+        };
+        let unnamed = Unnamed::beside(search, machine, facts);
+        let rows = unnamed.rows(search, memory);
+        let wide = unnamed.search(search, &rows);
+        let (modelled, has_parts) = self.modelled(
+            (search, &wide, memory.is_some()),
+            &unnamed,
+            given,
+            noise,
+            (doubt, is_rest),
+            propose,
+        );
+        (modelled.diagnosis(&wide, (machine, library), noise, &self.shares), has_parts)
+    }
+
+    /// The names alone.
+    fn alone(&self, search: &Search, given: (&Machine, &Library)) -> Modelled {
+        let kept: Vec<ModelTerm> = self.told.iter().map(|told| told.term.clone()).collect();
+        Modelled {
+            told: self.told.clone(),
+            shared_effects: self.shared_effects.clone(),
+            of_shared: shared::named(search, given, &kept, &self.shared_effects),
+            parts: Vec::new(),
+            of_parts: Vec::new(),
+            unexplained: None,
+            proposals: Vec::new(),
         }
+    }
+
+    /// Names and parts; whether there are parts. `narrow`, `search`: without and with free functions; `is_anew`: by another noise.
+    fn modelled(
+        &self,
+        (narrow, search, is_anew): (&Search, &Search, bool),
+        unnamed: &Unnamed,
+        given: (&Machine, &Library, &RecordingFacts),
+        noise: &[Noise],
+        (doubt, is_rest): (Doubt, bool),
+        propose: bool,
+    ) -> (Modelled, bool) {
+        let (machine, library, _) = given;
+        let shares = &self.shares;
+        let (mut told, mut shared_effects) = (self.told.clone(), self.shared_effects.clone());
+        let beside = |term: &ModelTerm| match is_anew {
+            true => search.anew(term),
+            false => term.clone(),
+        };
+        let mut of_search: Vec<ModelTerm> = told.iter().map(|told| told.term.clone()).collect();
+        told.iter_mut().for_each(|told| told.term = beside(&told.term));
+        shared_effects.iter_mut().for_each(|term| *term = beside(term));
+        let mut known: Vec<ModelTerm> =
+            told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
+        let (modelled, only_told) = unnamed.parts(search, &known);
+        let naming = unnamed.named(search, &known, modelled.clone());
+        let found: Vec<ModelTerm> =
+            naming.told.iter().map(|given| &given.term).chain(&naming.parts).cloned().collect();
+        let all = [known.as_slice(), &found].concat();
+        let has_parts = !modelled.is_empty()
+            && folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF);
+        // What helped alone may do harm beside them.
+        while let Some(i) = has_parts
+            .then(|| folds::worst(search, &[known.as_slice(), &found].concat(), told.len()))
+            .flatten()
+        {
+            told.remove(i);
+            of_search.remove(i);
+            shared_effects = shared::effects(narrow, library, &of_search);
+            shared_effects.iter_mut().for_each(|term| *term = beside(term));
+            known = told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
+        }
+        let (naming, only_told) = match has_parts {
+            true => (naming, Vec::new()),
+            false if is_rest => (naming.withdrawn(), Vec::new()),
+            false => (naming.withdrawn(), modelled.into_iter().chain(only_told).collect()),
+        };
+        for k in 0..naming.told.len() {
+            let others = naming.parts.iter().filter(|part| unnamed.group(part) != naming.told[k].group);
+            let others: Vec<ModelTerm> = known.iter().chain(others).cloned().collect();
+            told.extend(promoted(search, &others, &naming, k, shares, (machine, library)));
+        }
+        told.sort_by(|a, b| b.finding.delta_bic.total_cmp(&a.finding.delta_bic));
+        let known: Vec<ModelTerm> = told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
+        let shown = [naming.parts.as_slice(), &only_told].concat();
+        let all = [known.as_slice(), &shown].concat();
+        // All together: what stands in the model was solved with all that stands there.
+        let mut described = unnamed.told(search, &all, shares, (machine, library), has_parts);
+        let of_shown = described.split_off(known.len());
+        let (told_terms, rest) = described.split_at(told.len());
+        told.iter_mut().zip(told_terms).for_each(|(told, (_, named))| told.named = named.clone());
+        let of_shared: Vec<Named> = rest.iter().map(|(_, named)| named.clone()).collect();
+        let names = |term: &ModelTerm| naming.likely(&unnamed.group(term));
+        let rank = |term: &ModelTerm| naming.rank(&unnamed.group(term));
+        let (mut shown_parts, mut of_parts) = (Vec::new(), Vec::new());
+        for ((part, named), term) in of_shown.into_iter().zip(&shown) {
+            shown_parts.push((rank(term), UnnamedPart { names: names(term), ..part }));
+            of_parts.push(named);
+        }
+        let proposals = match has_parts && propose {
+            true => propose::proposals(search, unnamed, (&known, &shown), &names, given),
+            false => Vec::new(),
+        };
+        let found = search.beside_names(&known);
+        let is_named = is_rest || self.is_proved || !naming.told.is_empty();
+        let doubt = match is_named {
+            true => still(search, &found, doubt, !shown_parts.is_empty()),
+            false => Some(doubt),
+        };
+        let left = if is_named { &found } else { &search.base };
+        let mut unexplained = doubt.map(|doubt| unexplained_by(search, machine, noise, &doubt, left));
+        if let Some(unexplained) = &mut unexplained {
+            unexplained.take(shown_parts);
+        }
+        let (parts, of_parts) = if has_parts { (shown, of_parts) } else { Default::default() };
+        let modelled = Modelled { told, shared_effects, of_shared, parts, of_parts, unexplained, proposals };
+        (modelled, has_parts)
+    }
+}
+
+impl Modelled {
+    /// With all figures.
+    fn diagnosis(
+        self,
+        search: &Search,
+        (machine, library): (&Machine, &Library),
+        noise: &[Noise],
+        shares: &Shares,
+    ) -> Diagnosis {
+        let Modelled { mut told, shared_effects, of_shared, parts, of_parts, unexplained, proposals } = self;
+        let linear = search.rows.linear;
         let kept: Vec<ModelTerm> = told.iter().map(|told| told.term.clone()).collect();
         let placebos: Vec<Option<Placebo>> = told.iter_mut().map(|told| told.placebo.take()).collect();
         let left_over = residual_of(search, &[kept.as_slice(), &parts].concat());
@@ -250,8 +306,6 @@ impl Names {
         let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
         let (findings, mut named): (Vec<Finding>, Vec<Named>) =
             told.into_iter().map(|told| (told.finding, told.named)).unzip();
-        let of_shared =
-            of_shared.unwrap_or_else(|| shared::named(search, (machine, library), &kept, &shared_effects));
         named.extend(of_shared);
         named.extend(of_parts);
         let mut diagnosis = Diagnosis {
@@ -296,7 +350,7 @@ impl Names {
         traces::fill(search, &kept, &left_over, machine, &mut diagnosis);
         orders::join(search, &kept, &mut diagnosis);
         diagnosis.findings.iter_mut().for_each(Finding::share_out);
-        (diagnosis, has_parts)
+        diagnosis
     }
 }
 

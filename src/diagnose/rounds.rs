@@ -44,7 +44,7 @@ pub(super) struct Case<'a> {
 }
 
 /// What was said of a case.
-pub(super) struct Told {
+pub(super) struct Said {
     pub diagnosis: Diagnosis,
     /// A joint of which something is said that is so large that it is rare, and would be a lag's if that joint were late.
     pub may_be_late: Option<usize>,
@@ -55,7 +55,7 @@ impl Case<'_> {
     ///
     /// # Errors
     /// As [`crate::identify::calibrate`].
-    pub fn told(&self, plain: &[Candidate]) -> Result<Told> {
+    pub fn told(&self, plain: &[Candidate]) -> Result<Said> {
         let Case { machine, recordings, library, facts, progress, .. } = *self;
         progress("fitting constant geometry");
         let in_motion = facts_are_smooth(facts);
@@ -111,10 +111,10 @@ impl Case<'_> {
                 }
             }
             let judged = judge(&in_model);
-            let report = |search: &Search, in_model: &[ModelTerm]| -> Told {
+            let report = |search: &Search, in_model: &[ModelTerm]| -> Said {
                 let diagnosis =
                     report::report(search, in_model, (machine, library, facts), &noise, self.propose);
-                Told { diagnosis, may_be_late: lag::may_be_late(search, in_model) }
+                Said { diagnosis, may_be_late: lag::may_be_late(search, in_model) }
             };
             if moves < MOVES && !in_model.is_empty() {
                 if let Some(lagged) = lagged(&search, &in_model, plain) {

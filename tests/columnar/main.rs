@@ -2,10 +2,14 @@
 //!
 //! `cargo test --features columnar --test columnar`; `make.py` wrote the files.
 
+#[path = "../common/folder.rs"]
+mod folder;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use folder::Folder;
 use kincal::convert::{Converted, Request, read};
 use kincal::recording::{Chunk, Recording, bytes_of};
 use kincal::{Error, Machine};
@@ -236,15 +240,7 @@ fn damaged_files_are_refused_or_read_and_end_nothing() {
     assert!(sound > 100 && refused > 1000, "{sound} {refused}");
 }
 
-struct Folder(PathBuf);
-
 impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("kincal-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Folder(path)
-    }
-
     /// Runs the program here; its status and what it says of what is wrong.
     fn run(&self, args: &[&str]) -> (Option<i32>, String) {
         let output = Command::new(env!("CARGO_BIN_EXE_kincal")).current_dir(&self.0).args(args).output();
@@ -256,14 +252,8 @@ impl Folder {
         assert_eq!(self.run(args), (Some(0), String::new()), "{args:?}");
     }
 
-    fn read(&self, name: &str) -> Vec<u8> {
+    fn bytes(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.0.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 
@@ -286,7 +276,7 @@ fn every_command_takes_a_recording_in_columns_as_the_csv() {
         for (command, last) in [("calibrate", "ron"), ("predict", "csv"), ("diagnose", "ron")] {
             let of = |input: &str, output: &str| {
                 folder.done(&[command, machine, input, "-o", output, "--json", "out.json", "--quiet"]);
-                let json = String::from_utf8(folder.read("out.json")).expect("UTF-8");
+                let json = String::from_utf8(folder.bytes("out.json")).expect("UTF-8");
                 json.replace(input, "REC")
             };
             let csv = of("rec.csv", &format!("csv.{last}"));
@@ -296,8 +286,8 @@ fn every_command_takes_a_recording_in_columns_as_the_csv() {
         let predicted = format!("predicted.{ending}");
         folder.done(&["predict", machine, &rec, "-o", &predicted, "--quiet"]);
         folder.done(&["convert", &predicted, "-o", "again.csv", "--quiet"]);
-        let text = String::from_utf8(folder.read("csv.csv")).expect("UTF-8");
-        assert_eq!(bytes_of(&predicted, &text).expect("numbers"), folder.read(&predicted));
+        let text = String::from_utf8(folder.bytes("csv.csv")).expect("UTF-8");
+        assert_eq!(bytes_of(&predicted, &text).expect("numbers"), folder.bytes(&predicted));
     }
 }
 
@@ -313,6 +303,6 @@ fn a_file_in_columns_is_written_whole_or_not_at_all() {
         says.starts_with("error: out.parquet:4:2: `word` in column `x_meas[um]` is no number\n  = "),
         "{says}"
     );
-    assert_eq!(folder.read("out.parquet"), b"as it was");
+    assert_eq!(folder.bytes("out.parquet"), b"as it was");
     assert_eq!(std::fs::read_dir(&folder.0).expect("there").count(), 2);
 }

@@ -3,6 +3,7 @@
 
 pub mod channels;
 pub mod draws;
+pub mod folder;
 pub mod paper;
 pub mod planted;
 pub mod random;

@@ -382,22 +382,24 @@ fn arrays_of_numpy_are_tables() {
     assert!(read("a.npy", &word, Some(&axis), &names).is_err());
 }
 
+/// What is said of a file that nothing reads.
+fn says(file: &str, start: &[u8]) -> String {
+    let error = read(file, start, Some(&machine("scara")), &Request::default()).expect_err("no reader");
+    format!("{error}\n  = {}", error.mend())
+}
+
 /// A build without the readers knows such files, and says how to go on.
 #[cfg(not(feature = "columnar"))]
 #[test]
 fn tables_in_columns_are_known_where_nothing_reads_them() {
-    let scara = machine("scara");
-    let says = |file: &str, start: &[u8]| {
-        let error = read(file, start, Some(&scara), &Request::default()).expect_err("no reader");
-        format!("{error}\n  = {}", error.mend())
-    };
     assert_eq!(
         says("a.parquet", b"PAR1\x15\x04"),
         "a.parquet: this is a Parquet file, which this build of kincal does not read\n  = build it with `--features columnar`, or write it as CSV: \
          `duckdb -c \"COPY 'a.parquet' TO 'a.csv'\"`, or in Python `pandas.read_parquet('a.parquet').to_csv('a.csv', index=False)`"
     );
     assert!(says("b", b"ARROW1\0\0").contains("`pandas.read_feather('b').to_csv('b.csv', index=False)`"));
-    let error = Recording::from_bytes("a", b"PAR1\x15\x04".as_slice(), &scara).expect_err("no reader");
+    let error =
+        Recording::from_bytes("a", b"PAR1\x15\x04".as_slice(), &machine("scara")).expect_err("no reader");
     assert!(error.mend().starts_with("build it with `--features columnar`"));
     let error = kincal::recording::bytes_of("a.parquet", "# measurement: joint\n").expect_err("no writer");
     assert_eq!(error.to_string(), "a.parquet: this build of kincal writes no Parquet file");
@@ -406,11 +408,6 @@ fn tables_in_columns_are_known_where_nothing_reads_them() {
 /// Bags are known by their first bytes, those that nothing reads too.
 #[test]
 fn bags_that_are_not_read_are_told_how_to_go_on() {
-    let scara = machine("scara");
-    let says = |file: &str, start: &[u8]| {
-        let error = read(file, start, Some(&scara), &Request::default()).expect_err("no reader");
-        format!("{error}\n  = {}", error.mend())
-    };
     let old = says("a.bag", b"#ROSBAG V2.0\n");
     assert!(
         old.starts_with(
@@ -428,7 +425,7 @@ fn bags_that_are_not_read_are_told_how_to_go_on() {
         ),
     }
     let told = Request::default().with_pose_topic("/pose");
-    let error = read("t.csv", b"t_s,x_mm\n0,1\n", Some(&scara), &told).expect_err("no bag");
+    let error = read("t.csv", b"t_s,x_mm\n0,1\n", Some(&machine("scara")), &told).expect_err("no bag");
     assert!(error.mend().contains("leave --joint-topic, --pose-topic, --frames and --longest-gap out"));
 }
 

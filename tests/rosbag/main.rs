@@ -2,9 +2,13 @@
 //!
 //! `cargo test --features rosbag --test rosbag`; `make.py` wrote the files.
 
+#[path = "../common/folder.rs"]
+mod folder;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use folder::Folder;
 use kincal::convert::{Converted, Request, open, read};
 use kincal::{Error, Machine};
 
@@ -216,22 +220,6 @@ fn what_is_whole_of_a_bag_is_read_and_damage_is_told() {
     }
     println!("{read_on} read, {refused} refused");
     assert!(read_on > 100 && refused > 300, "{read_on} {refused}");
-}
-
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("kincal-bag-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&path).expect("a folder");
-        Folder(path)
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
 }
 
 /// The command that a message shows runs as it is.
