@@ -18,6 +18,7 @@ mod detour;
 mod diagnosis;
 mod discrepancy;
 mod doubt;
+mod drives;
 mod elsewhere;
 mod enter;
 mod equations;

@@ -98,10 +98,10 @@ pub struct Thinned {
 }
 
 impl Diagnosis {
-    /// Whether the model has anything beside constant geometry: what was found, or parts of what has no name.
+    /// Whether the model has anything beside constant geometry: what was found, what joints have besides, or parts of what has no name.
     pub fn has_more_than_geometry(&self) -> bool {
         let parts = self.unexplained.iter().flat_map(|unexplained| &unexplained.parts);
-        !self.findings.is_empty() || parts.into_iter().any(|part| part.modelled)
+        !self.findings.is_empty() || !self.shared.is_empty() || parts.into_iter().any(|part| part.modelled)
     }
 
     /// Whether its model foretells left-out stretches better than that of another one.

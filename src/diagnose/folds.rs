@@ -200,7 +200,7 @@ impl Normal {
     fn new(search: &Search, in_model: &[ModelTerm]) -> Option<Self> {
         let rows = search.rows;
         let fold_of = stretches(search)?;
-        let mut white = rows.linear.constant.clone();
+        let mut white = rows.always();
         rows.whiten(&mut white);
         let mut owner = vec![None; white.ncols()];
         // Where one stands for what was the shape of another, the shape of either would do without the other.
@@ -354,8 +354,7 @@ impl Folds {
     /// `owner`: the fold of each row; `stretch`: as [`stretches`].
     fn of(search: &Search, told: &[ModelTerm], owner: Vec<usize>, stretch: Vec<usize>) -> Option<Self> {
         let rows = search.rows;
-        let linear = rows.linear;
-        let mut raw = linear.constant.clone();
+        let mut raw = rows.always();
         let mut part = vec![Part::Geometry; raw.ncols()];
         let mut put = |own: &DMatrix<f64>, of: Part| {
             let at = raw.ncols();

@@ -49,7 +49,7 @@ impl Solved {
 
 impl Model {
     pub fn new(search: &Search, in_model: &[ModelTerm]) -> Self {
-        let mut columns = search.rows.linear.constant.clone();
+        let mut columns = search.rows.always();
         search.rows.whiten(&mut columns);
         let mut offsets = Vec::new();
         for effect in in_model {
@@ -112,8 +112,8 @@ impl Model {
     ) -> Vec<f64> {
         let linear = search.rows.linear;
         let mut left = DVector::from_column_slice(&linear.residual);
-        let constants = linear.constant.ncols();
-        left -= &linear.constant * self.solution.rows(0, constants);
+        let always = search.rows.always();
+        left -= &always * self.solution.rows(0, always.ncols());
         for (i, effect) in in_model.iter().enumerate() {
             let candidate = &search.candidates[effect.candidate];
             if !is_taken(candidate) {

@@ -84,7 +84,7 @@ impl Unnamed {
             }
             None => whitener.clone(),
         };
-        Rows::new(search.rows.linear, &self.coarse, whitener)
+        Rows::new(search.rows.linear, search.rows.drives(), &self.coarse, whitener)
     }
 
     /// The search with these candidates.
@@ -95,7 +95,7 @@ impl Unnamed {
         Search {
             rows,
             runs: search.runs,
-            base: rows.constant(),
+            base: rows.base(),
             candidates: &self.candidates,
             priors: self.candidates.iter().map(|c| (c.often / total).ln()).collect(),
             commonness,

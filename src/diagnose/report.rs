@@ -6,6 +6,7 @@ use super::approaches::approaches;
 use super::contained::says_no_more;
 use super::diagnosis::{Diagnosis, Named, SharedEffect, Thinned};
 use super::doubt::{CHANCE, Doubt, doubt, still};
+use super::drives::Drives;
 use super::finding::{Finding, Meaningless};
 use super::folds;
 use super::held_out::Model;
@@ -298,11 +299,15 @@ impl Modelled {
         shares: &Shares,
     ) -> Diagnosis {
         let Modelled { mut told, shared_effects, of_shared, parts, of_parts, unexplained, proposals } = self;
+        // Figures are of what the file has.
+        let none = Drives::default();
+        let rows = search.rows.with(&none);
+        let search = &search.rigid(&rows);
         let linear = search.rows.linear;
         let kept: Vec<ModelTerm> = told.iter().map(|told| told.term.clone()).collect();
         let placebos: Vec<Option<Placebo>> = told.iter_mut().map(|told| told.placebo.take()).collect();
-        let left_over = residual_of(search, &[kept.as_slice(), &parts].concat());
         let in_model = [kept.as_slice(), &shared_effects, &parts].concat();
+        let left_over = residual_of(search, &in_model);
         let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
         let (findings, mut named): (Vec<Finding>, Vec<Named>) =
             told.into_iter().map(|told| (told.finding, told.named)).unzip();

@@ -5,6 +5,7 @@ use std::sync::Mutex;
 
 use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
+use super::drives::Drives;
 use super::folds;
 use super::lag::{self, lagged};
 use super::linear::{Linear, linear};
@@ -63,6 +64,11 @@ impl Case<'_> {
         let mut candidates = plain.to_vec();
         let runs = noise::runs(&linear);
         let mut coarse = Coarse::new(&linear, candidates.len());
+        let drives_of = |linear: &Linear, coarse: &Coarse| match in_motion {
+            true => Drives::of(linear, coarse, plain, library),
+            false => Drives::default(),
+        };
+        let mut drives = drives_of(&linear, &coarse);
         let mut out = noise::outliers(&linear, &runs, facts_are_smooth(facts));
         if facts_are_smooth(facts) {
             noise::spare_reversals(&linear, &mut out);
@@ -77,11 +83,11 @@ impl Case<'_> {
         let (mut round, mut moves, mut forgot) = (1, 0, false);
         loop {
             let rows =
-                Rows::new(&linear, &coarse, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
+                Rows::new(&linear, &drives, &coarse, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
             let search = Search {
                 rows: &rows,
                 runs: &runs,
-                base: rows.constant(),
+                base: rows.base(),
                 candidates: &candidates,
                 priors: priors.clone(),
                 commonness: commonness.clone(),
@@ -125,6 +131,7 @@ impl Case<'_> {
                 let moved =
                     relinearised::straightened(&search, &in_model, machine, recordings, &facts.dead_bands)?;
                 if let Some(moved) = moved {
+                    drives = drives_of(&moved, &coarse);
                     (linear, noise, moves) = (moved, judged, moves + 1);
                     continue;
                 }

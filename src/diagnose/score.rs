@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cells::CellSums;
 use super::coarse::Coarse;
+use super::drives::Drives;
 use super::equations::{
     BATCH, Best, Column, Key, ROOM, ROOM_BEYOND, Score, best, judge, key, lengths, unit_size,
 };
@@ -22,6 +23,7 @@ use crate::variation::Slot;
 /// Rows of the recordings and what turns them white.
 pub(super) struct Rows<'a> {
     pub linear: &'a Linear,
+    drives: &'a Drives,
     pub whitener: Whitener,
     /// Whitened residuals of the constant model.
     pub residual: DVector<f64>,
@@ -57,11 +59,12 @@ pub(super) struct Wave {
 }
 
 impl<'a> Rows<'a> {
-    pub fn new(linear: &'a Linear, coarse: &'a Coarse, whitener: Whitener) -> Self {
+    pub fn new(linear: &'a Linear, drives: &'a Drives, coarse: &'a Coarse, whitener: Whitener) -> Self {
         let mut residual = DVector::zeros(linear.residual.len());
         whitener.apply(&linear.residual, residual.as_mut_slice());
         Rows {
             linear,
+            drives,
             whitener,
             residual,
             coarse,
@@ -82,11 +85,26 @@ impl<'a> Rows<'a> {
         Field { marginal, left, coarse, cells: Mutex::default() }
     }
 
-    /// Everything constant, marginalised.
-    pub fn constant(&self) -> Marginal {
-        let mut columns = self.linear.constant.clone();
+    /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way.
+    pub fn always(&self) -> DMatrix<f64> {
+        self.drives.behind(&self.linear.constant)
+    }
+
+    /// The same, marginalised.
+    pub fn base(&self) -> Marginal {
+        let mut columns = self.always();
         self.whiten(&mut columns);
         Marginal::new(columns)
+    }
+
+    /// The same rows where only what is asked for gives way.
+    pub fn with(&self, drives: &'a Drives) -> Rows<'a> {
+        Rows::new(self.linear, drives, self.coarse, self.whitener.clone())
+    }
+
+    /// How drives give way.
+    pub fn drives(&self) -> &'a Drives {
+        self.drives
     }
 
     pub fn whiten(&self, columns: &mut DMatrix<f64>) {

@@ -112,6 +112,19 @@ impl Search<'_> {
         measure(left.as_slice(), self.runs, &self.rows.whitener.out)
     }
 
+    /// The same rows where no drive gives way but those that are asked for.
+    pub fn rigid<'b>(&'b self, rows: &'b Rows<'b>) -> Search<'b> {
+        Search {
+            rows,
+            base: rows.base(),
+            priors: self.priors.clone(),
+            commonness: self.commonness.clone(),
+            known: Mutex::default(),
+            grounds: Mutex::default(),
+            ..*self
+        }
+    }
+
     /// How many effects are looked for at most.
     pub fn most(&self) -> usize {
         if self.in_motion { MOST_IN_MOTION } else { MOST }

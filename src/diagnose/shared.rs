@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::diagnosis::Named;
+use super::drives::Drives;
 use super::held_out::Model;
 use super::search::Search;
 use super::set_ups;
@@ -17,18 +18,28 @@ pub(super) fn effects(search: &Search, library: &Library, kept: &[ModelTerm]) ->
     let of = |candidate: usize| &search.candidates[candidate];
     let comes_along = |candidate: usize| {
         let (own, family) = (of(candidate), &library.families()[of(candidate).family]);
+        let by_itself = family.of_every_drive && search.in_motion;
         let is_alike = |effect: &ModelTerm| match family.each_setup {
             true => of(effect.candidate).family == own.family,
             false => {
                 family.at_every_joint && !search.in_motion && of(effect.candidate).told_as == own.told_as
             }
         };
-        own.parameters.is_empty() && kept.iter().any(is_alike)
+        own.parameters.is_empty() && (by_itself || kept.iter().any(is_alike))
     };
     let known = |all: &[ModelTerm], candidate: usize| all.iter().any(|effect| effect.candidate == candidate);
     let mut all = kept.to_vec();
     let mut left: Vec<usize> =
         (0..search.candidates.len()).filter(|i| comes_along(*i) && !known(kept, *i)).collect();
+    let (none, rows);
+    let search = match left.is_empty() {
+        true => search,
+        false => {
+            none = Drives::default();
+            rows = search.rows.with(&none);
+            &search.rigid(&rows)
+        }
+    };
     while !left.is_empty() {
         let marginal = Arc::new(search.beside(&all, None));
         let field = search.rows.field(marginal.clone());

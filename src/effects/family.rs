@@ -75,6 +75,9 @@ pub struct Family {
     /// Every joint has it, more or less: where it is found at one, the model may have it at the others too.
     #[serde(default, skip_serializing_if = "is_default")]
     pub at_every_joint: bool,
+    /// Every drive has it, more or less: models of machines in motion have a little of it at every joint from the beginning.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub of_every_drive: bool,
     /// Found several times at one place, with other orders, it is one error motion and one finding.
     #[serde(default, skip_serializing_if = "is_default")]
     pub as_one: bool,
