@@ -92,6 +92,13 @@ pub(super) fn report(
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
         !empty.contains(&place(i)) && (!search.in_motion || finding.probability > LIKELY)
     };
+    // What every drive does the model has, whether it is said or not.
+    let goes_unsaid = |told: &(usize, Finding, Named)| {
+        let family = &library.families()[search.candidates[in_model[told.0].candidate].family];
+        search.in_motion && family.of_every_drive && !holds(told)
+    };
+    let said = told.into_iter().zip(placebos).filter(|(told, _)| !goes_unsaid(told));
+    (told, placebos) = said.unzip();
     let likely = told.iter().filter(|told| holds(told)).count();
     if likely < told.len() {
         let unlikely = told.iter().filter(|told| !holds(told));

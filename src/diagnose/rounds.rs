@@ -82,8 +82,12 @@ impl Case<'_> {
         let mut in_model: Vec<ModelTerm> = Vec::new();
         let (mut round, mut moves, mut forgot) = (1, 0, false);
         loop {
-            let rows =
-                Rows::new(&linear, &drives, &coarse, Whitener::new(linear.residual.len(), &runs, &noise, out.clone()));
+            let rows = Rows::new(
+                &linear,
+                &drives,
+                &coarse,
+                Whitener::new(linear.residual.len(), &runs, &noise, out.clone()),
+            );
             let search = Search {
                 rows: &rows,
                 runs: &runs,

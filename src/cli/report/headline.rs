@@ -99,7 +99,7 @@ fn sentence(parts: &[Part], numbers: u64, names: &[String]) -> String {
         let names = match names.split_last() {
             Some((last, [])) => last.clone(),
             Some((last, others)) => format!("{} and {last}", others.join(", ")),
-            None => "all that was found".into(),
+            None => "what every joint has more or less".into(),
         };
         text += &format!("{} {last} with {names}", if idle { ";" } else { "," });
     }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::actions::{Action, actions, of_finding};
 use super::headline::of_diagnosis;
-use super::text::{CALM, about, about_unexplained, beside, figures};
+use super::text::{about, about_unexplained, beside, calm, figures};
 use crate::cli::output::count;
 use crate::diagnose::Diagnosis;
 use crate::location::LocationErrors;
@@ -28,7 +28,7 @@ pub(crate) fn render(diagnosis: &Diagnosis) -> String {
             let _ = writeln!(text, "   {line}");
         }
     } else if diagnosis.findings.is_empty() {
-        let _ = writeln!(text, "\n{CALM}");
+        let _ = writeln!(text, "\n{}", calm(diagnosis));
     }
     text.push_str(&geometry_to_do(&diagnosis.location_errors));
     for timeless in diagnosis.not_tried.iter().filter(|n| n.for_want_of_time) {

@@ -67,7 +67,13 @@ pub(super) fn beside(diagnosis: &Diagnosis) -> Vec<String> {
 }
 
 /// Where there is nothing to be found.
-pub(super) const CALM: &str = "Constant geometry explains these recordings down to their noise: there is nothing else to be found in them.";
+pub(super) fn calm(diagnosis: &Diagnosis) -> String {
+    let explains = match diagnosis.shared.is_empty() {
+        true => "Constant geometry explains",
+        false => "Constant geometry and what every joint has more or less explain",
+    };
+    format!("{explains} these recordings down to their noise: there is nothing else to be found in them.")
+}
 
 /// What was looked at, noise and root mean squares, a line each.
 pub(super) fn figures(diagnosis: &Diagnosis) -> Vec<String> {
