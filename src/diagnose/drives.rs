@@ -9,7 +9,7 @@ use super::whitener::Whitener;
 use crate::effects::{Candidate, Library};
 
 /// Drives give way by about this part of what a family that is said by name usually does, before readings are asked.
-const GIVE_WAY: f64 = 0.01;
+const GIVE_WAY: f64 = 0.02;
 
 /// Families with `of_every_drive`, at all joints: geometry in motion is never alone.
 #[derive(Default)]

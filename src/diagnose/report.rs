@@ -59,6 +59,10 @@ pub(super) fn report(
         }
         doubt => doubt,
     };
+    if let Some(said) = without_unsaid(search, in_model, (machine, library), &shares, noise, doubt.is_some())
+    {
+        return report(search, &said, (machine, library, facts), noise, propose);
+    }
     // Where names do not explain all that is there, they stand if they foretell more than what has no name does.
     let proved = doubt.as_ref().and_then(|_| proved(search, in_model, (machine, facts), noise));
     let is_proved = proved.is_some();
@@ -92,13 +96,6 @@ pub(super) fn report(
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
         !empty.contains(&place(i)) && (!search.in_motion || finding.probability > LIKELY)
     };
-    // What every drive does the model has, whether it is said or not.
-    let goes_unsaid = |told: &(usize, Finding, Named)| {
-        let family = &library.families()[search.candidates[in_model[told.0].candidate].family];
-        search.in_motion && family.of_every_drive && !holds(told)
-    };
-    let said = told.into_iter().zip(placebos).filter(|(told, _)| !goes_unsaid(told));
-    (told, placebos) = said.unzip();
     let likely = told.iter().filter(|told| holds(told)).count();
     if likely < told.len() {
         let unlikely = told.iter().filter(|told| !holds(told));
@@ -131,6 +128,38 @@ pub(super) fn report(
     let short: Vec<Noise> = noise.iter().map(Noise::shortened).collect();
     let (shortened, has_parts) = findings.with_parts(search, given, noise, Some(&short), propose);
     if has_parts && shortened.foretells_more(&plain) { shortened } else { plain }
+}
+
+/// The effects without those that the model has anyhow and that need not be said: what every drive does, where that is not likely to be more
+/// than they all do, or where nothing is in doubt without it. `None` where there is none.
+fn without_unsaid(
+    search: &Search,
+    in_model: &[ModelTerm],
+    (machine, library): (&Machine, &Library),
+    shares: &Shares,
+    noise: &[Noise],
+    is_doubted: bool,
+) -> Option<Vec<ModelTerm>> {
+    let family = |i: &usize| &library.families()[search.candidates[in_model[*i].candidate].family];
+    let of_drives: Vec<usize> = (0..in_model.len()).filter(|i| family(i).of_every_drive).collect();
+    if !search.in_motion || of_drives.is_empty() {
+        return None;
+    }
+    let others = |but: &[usize]| -> Vec<ModelTerm> {
+        (0..in_model.len()).filter(|i| !but.contains(i)).map(|i| in_model[i].clone()).collect()
+    };
+    let model = Model::new(search, in_model);
+    let is_likely = |i: &usize| {
+        let told = finding(search, in_model, *i, shares, (machine, library), &model);
+        told.is_some_and(|(finding, _)| finding.probability > LIKELY)
+    };
+    let unlikely: Vec<usize> = of_drives.iter().copied().filter(|i| !is_likely(i)).collect();
+    if !unlikely.is_empty() {
+        return Some(others(&unlikely));
+    }
+    let rest = others(&of_drives);
+    let is_calm = || doubt(search, &rest, machine, &search.shares(&rest), noise).is_none();
+    (is_doubted && is_calm()).then_some(rest)
 }
 
 /// What is said by name, before what has none is asked for.
