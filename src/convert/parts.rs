@@ -42,8 +42,8 @@ impl Parts {
         let mut files: Vec<PathBuf> = all.iter().filter(|path| ends(path, "mcap")).cloned().collect();
         files.sort_by_cached_key(|file| numbered(file));
         let Some(first) = files.first() else {
-            // Bags of other kinds have a folder too.
-            for path in &all {
+            // Bags of other kinds have a folder too, and compressed ones.
+            for path in all.iter().filter(|path| ["db3", "zstd"].iter().any(|ending| ends(path, ending))) {
                 if let Some(Foreign { what, mend: Some(mend) }) = begun(path) {
                     return Err(fault(
                         format!("{} is {what}, which is not read", name(path)),

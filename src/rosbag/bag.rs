@@ -88,9 +88,12 @@ impl Bag {
             if let End::Cut { at } = end {
                 let lost = size - at.min(size);
                 let of = if several { file.display().to_string() } else { "the bag".into() };
-                let what = format!("{of} is cut off: it ends in a record that begins at byte {at} of {size}");
-                let what =
-                    format!("{what}; these last {lost} bytes are lost, what stands before them is read");
+                let what = match size {
+                    0 => format!("{of} is empty: nothing came to be written to it"),
+                    _ => format!(
+                        "{of} is cut off: it ends in a record that begins at byte {at} of {size}; these last {lost} bytes are lost, what stands before them is read"
+                    ),
+                };
                 reader.bag.lost.push(what);
             }
         }
