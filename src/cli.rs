@@ -9,6 +9,7 @@ mod convert;
 mod demo;
 mod describe;
 mod diagnose;
+mod examples;
 mod export;
 pub mod face;
 mod failure;
@@ -28,6 +29,7 @@ mod predict;
 mod program;
 mod report;
 mod simulate;
+mod streams;
 mod verdict;
 mod verify;
 
@@ -39,6 +41,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use failure::Outcome;
 use files::{Destination, Files};
 use output::{complain, printed};
+use streams::StandardInput;
 
 /// Calibrates the geometry of any serial or bifurcated machine.
 #[derive(Parser)]
@@ -103,6 +106,11 @@ pub(crate) struct Common {
     quiet: bool,
 }
 
+/// All commands with their arguments and examples.
+fn command() -> clap::Command {
+    examples::shown(Cli::command())
+}
+
 /// Runs the command line: 0 done, 1 input at fault, 2 usage.
 pub fn run() -> ExitCode {
     ExitCode::from(run_with(std::env::args_os()))
@@ -110,7 +118,8 @@ pub fn run() -> ExitCode {
 
 /// The same with these arguments, the name of the program first.
 fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let mut known = Cli::command();
+    let input = StandardInput::new();
+    let mut known = input.understood(command());
     let matches = known.try_get_matches_from_mut(arguments);
     let parsed = matches.and_then(|matches| {
         let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut known))?;
@@ -122,13 +131,18 @@ fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => (error.exit_code().try_into().unwrap_or(2), printed(error.print())),
         Ok((command, files)) => {
             part::tidy_when_interrupted();
-            (0, files.check().and_then(|()| execute(&command, &files)))
+            let run = || {
+                files.check()?;
+                let _until_the_end = input.read()?;
+                execute(&command, &files)
+            };
+            (0, run())
         }
     };
     match outcome {
         Ok(()) => status,
         Err(failure) => {
-            complain(&failure);
+            complain(&failure, &input.path());
             1
         }
     }
@@ -153,8 +167,8 @@ fn execute(command: &Command, files: &Files) -> Outcome {
         Command::Convert(args) => convert::run(args, files),
         Command::Export(args) => export::run(args),
         Command::Machines(args) => machines::run(args),
-        Command::Completions(args) => completions::run(args, Cli::command()),
-        Command::Man(args) => man::run(args, Cli::command()),
+        Command::Completions(args) => completions::run(args, self::command()),
+        Command::Man(args) => man::run(args, self::command()),
         Command::Demo(args) => demo::run(args),
     }
 }

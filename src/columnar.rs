@@ -20,7 +20,7 @@ mod writer;
 
 #[cfg(not(feature = "columnar"))]
 pub(crate) use absent::{Table, Writer};
-pub(crate) use form::{Form, START};
+pub(crate) use form::Form;
 #[cfg(feature = "columnar")]
 pub(crate) use table::Table;
 pub(crate) use text::Text;

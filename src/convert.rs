@@ -25,7 +25,7 @@ mod moment;
 mod no_bag;
 mod nominal;
 mod npy;
-mod older_bag;
+mod parts;
 mod plan;
 mod positioning;
 mod r_test;
@@ -43,8 +43,9 @@ mod topics;
 mod unit;
 mod write;
 
-use std::io::{BufReader, Read};
-use std::path::Path;
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read};
+use std::path::{Path, PathBuf};
 
 #[cfg(not(feature = "rosbag"))]
 use no_bag as bag;
@@ -61,10 +62,12 @@ pub use write::Written;
 
 use serde::{Deserialize, Serialize};
 
-use crate::columnar::{Form, START};
+use crate::columnar::Form;
 use crate::error::{Error, Place, Result};
+use crate::foreign::{self, Foreign, MCAP, NUMPY, START};
 use crate::machine::Machine;
 use map::Known;
+use parts::Parts;
 use table::{Table, Told};
 
 /// Recordings that were made of a table.
@@ -84,28 +87,65 @@ pub struct Converted {
     pub positioning: Option<Positioning>,
 }
 
-/// Reads the table at `path`.
+/// Reads the table at `path`, which may be a folder with a bag of ROS 2.
 ///
 /// # Errors
 /// As [`read`], and [`Error::File`].
 pub fn open(path: impl AsRef<Path>, machine: Option<&Machine>, request: &Request) -> Result<Converted> {
-    let path = path.as_ref();
-    let fault = |source| Error::file(path, source);
-    let mut file = std::fs::File::open(path).map_err(fault)?;
-    let mut bytes = Vec::new();
-    (&mut file).take(bag::MAGIC.len() as u64).read_to_end(&mut bytes).map_err(fault)?;
-    if bytes == bag::MAGIC {
-        // Bags have cameras in them, and are larger than memory.
-        return of_bag(path, bytes.chain(BufReader::new(file)), machine, request);
-    }
-    file.read_to_end(&mut bytes).map_err(fault)?;
-    read(path, &bytes, machine, request)
+    open_parts(&[path.as_ref().to_path_buf()], machine, request)
 }
 
-/// The recording of a bag, which `input` reads from its beginning.
-fn of_bag(file: &Path, input: impl Read, machine: Option<&Machine>, request: &Request) -> Result<Converted> {
+/// Reads several files as one recording: those of a bag of ROS 2 that its recorder has split, each named, or as the folder that they are in.
+///
+/// # Errors
+/// As [`open`], and where several are no bag.
+pub fn open_parts(paths: &[PathBuf], machine: Option<&Machine>, request: &Request) -> Result<Converted> {
+    let Parts { files, told } = Parts::of(paths)?;
+    let mut parts: Vec<Part> = Vec::new();
+    for path in &files {
+        let fault = |source| Error::file(path, source);
+        let mut file = File::open(path).map_err(fault)?;
+        let mut bytes = Vec::new();
+        (&mut file).take(START as u64).read_to_end(&mut bytes).map_err(fault)?;
+        // A recorder that was stopped may have begun a file and written nothing.
+        let is_bag = bytes.starts_with(MCAP) || (files.len() > 1 && bytes.is_empty());
+        match (is_bag, files.len()) {
+            // Bags have cameras in them, and are larger than memory.
+            (true, _) => parts.push((path, Box::new(Cursor::new(bytes).chain(BufReader::new(file))))),
+            (false, 1) => {
+                file.read_to_end(&mut bytes).map_err(fault)?;
+                return read(path, &bytes, machine, request);
+            }
+            (false, _) => {
+                let what = "this is no bag of ROS 2 (MCAP): of other files each is a recording of its own";
+                return Err(Error::mistake(Place::file(path), what, "convert them one by one"));
+            }
+        }
+    }
+    let Some(file) = paths.first() else {
+        return Err(Error::mistake(Place::file(""), "no file is named", "name a table, or a bag"));
+    };
+    let mut converted = of_bag(file, parts, machine, request)?;
+    converted.told.splice(..0, told);
+    Ok(converted)
+}
+
+/// The files that [`open_parts`] reads, folders opened.
+///
+/// # Errors
+/// [`Error::Input`]: a folder without a bag; [`Error::File`].
+#[cfg(feature = "cli")]
+pub(crate) fn files_of(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    Ok(Parts::of(paths)?.files)
+}
+
+/// A file of a bag, and what reads it from its beginning.
+type Part<'a> = (&'a Path, Box<dyn Read + 'a>);
+
+/// The recording of a bag, which messages call `file`.
+fn of_bag(file: &Path, parts: Vec<Part>, machine: Option<&Machine>, request: &Request) -> Result<Converted> {
     let known = request.map.as_ref().map(|path| Known::open(path)).transpose()?;
-    let mut bagged = bag::read(file, input, machine, request)?;
+    let mut bagged = bag::read(file, parts, machine, request)?;
     let (known, notes) = match (known, machine) {
         (Some(known), _) => (known, Vec::new()),
         (None, Some(machine)) => {
@@ -165,16 +205,19 @@ pub fn read(
     let flag = |name: &str, (what, mend): (String, String)| {
         Error::mistake(Place::file(file), format!("--{name}: {what}"), mend)
     };
-    if bytes.starts_with(bag::MAGIC) {
-        return of_bag(file, bytes, machine, request);
+    if bytes.starts_with(MCAP) {
+        return of_bag(file, vec![(file, Box::new(bytes))], machine, request);
     }
-    older_bag::refuse(file, bytes)?;
+    let start = &bytes[..bytes.len().min(START)];
+    let form = Form::of_file(file, start)?;
+    if let Some(Foreign { what, mend: Some(mend) }) = foreign::of(file, start).filter(|_| form.is_none()) {
+        return Err(Error::mistake(Place::file(file), format!("this is {what}, which is not read"), mend));
+    }
     if request.is_of_bag() {
         let what = "it tells what to take of a bag of ROS 2, and this is no such file";
         let mend = "leave --joint-topic, --pose-topic, --frames and --longest-gap out, or give a file .mcap";
         return Err(Error::mistake(Place::file(file), what, mend));
     }
-    let form = Form::of_file(file, &bytes[..bytes.len().min(START)])?;
     // Where something is told of it, a recording is a table as any other.
     if (Request { call: None, ..request.clone() }) == Request::default()
         && let Some(recording) = recorded::read(file, bytes, form, machine)?
@@ -212,7 +255,7 @@ pub fn read(
         (None, Some(renishaw::read(file, bytes, machine, request)?))
     } else if capture::is_one(file, bytes) {
         (Some(capture::read(file, bytes, &told)?), None)
-    } else if bytes.starts_with(npy::MAGIC) {
+    } else if bytes.starts_with(NUMPY) {
         (Some(npy::read(file, bytes, &told)?), None)
     } else if let Some(head) = targets::head(bytes, &told).filter(|_| is_free) {
         (None, Some(targets::read(file, bytes, &head, machine, request)?))

@@ -9,12 +9,15 @@ use ron::extensions::Extensions;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Place, Result};
+use crate::foreign;
 use crate::wording::count;
 
 /// Larger texts are refused: a machine is a few kilobytes.
 const MOST_BYTES: usize = 8 << 20;
 /// Deeper nesting is refused before any reader recurses into it.
 const MOST_DEPTH: usize = 32;
+
+const NO_TEXT: &str = "a machine file is plain text in RON; is this the right file?";
 
 /// `travel: (0, 1)` instead of `Some((0, 1))`, and `Revolute(axis: "z")` instead of `Revolute((axis: "z"))`.
 pub(crate) const EXTENSIONS: Extensions =
@@ -63,14 +66,14 @@ impl Document {
             ));
         }
         let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
+        if let Some(foreign) = foreign::of(path, &bytes[..bytes.len().min(foreign::START)]) {
+            let what = format!("this is {}, and no machine file", foreign.what);
+            return Err(Error::mistake(Place::file(path), what, NO_TEXT));
+        }
         let text = String::from_utf8(bytes).map_err(|e| {
             let good = String::from_utf8_lossy(&e.as_bytes()[..e.utf8_error().valid_up_to()]).into_owned();
             let (line, column) = line_and_column(&good, good.len());
-            Error::mistake(
-                Place::at(path, line, column),
-                "this is not UTF-8 text",
-                "a machine file is plain text in RON; is this the right file?",
-            )
+            Error::mistake(Place::at(path, line, column), "this is not UTF-8 text", NO_TEXT)
         })?;
         Self::new(path, text)
     }

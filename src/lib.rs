@@ -29,6 +29,7 @@
 //! | [`units`] | units at the borders, and what lengths and angles have one of each |
 //! | `residual` | how large residuals are: sums from which RMS, mean and largest follow |
 //! | [`error`] | places in what a user wrote, faults with their mend |
+//! | `foreign` | files of other programs that are no text, by how they begin |
 //! | `document` | RON texts, and where in them each value stands |
 //! | [`machine`] | dyads, joints, the machine file |
 //! | [`chain`] | poses and Jacobian rows of a machine with given deviations |
@@ -148,6 +149,7 @@ mod feature;
 #[doc(hidden)]
 pub mod feature;
 mod few;
+mod foreign;
 pub mod identify;
 #[cfg(feature = "import")]
 pub mod import;

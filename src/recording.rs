@@ -61,8 +61,9 @@ use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use crate::columnar::{Form, Input, START, Text};
+use crate::columnar::{Form, Input, Text};
 use crate::error::{Error, Place, Result};
+use crate::foreign::{self, Foreign, START};
 use crate::machine::Machine;
 use column::Layout;
 use header::Draft;
@@ -131,6 +132,7 @@ impl Source {
                 if let Some(form) = Form::of(path, &bytes[..bytes.len().min(START)])? {
                     return in_columns(path, form, Input::Bytes(bytes.clone()), offset);
                 }
+                known(path, foreign::of(path, &bytes[..bytes.len().min(START)]))?;
                 let mut cursor = Cursor::new(bytes.clone());
                 cursor.set_position(offset);
                 Ok(Box::new(cursor))
@@ -138,10 +140,14 @@ impl Source {
             Source::File => {
                 let mut file = File::open(path).map_err(failed)?;
                 let mut start = Vec::with_capacity(START);
+                if path.is_dir() {
+                    known(path, Some(foreign::of_folder(path)))?;
+                }
                 file.by_ref().take(START as u64).read_to_end(&mut start).map_err(failed)?;
                 if let Some(form) = Form::of_file(path, &start)? {
                     return in_columns(path, form, Input::File(file), offset);
                 }
+                known(path, foreign::of(path, &start))?;
                 if offset > 0 {
                     file.seek(SeekFrom::Start(offset)).map_err(failed)?;
                     return Ok(Box::new(file));
@@ -335,6 +341,13 @@ fn error(path: &Path, Fail { line, column, fault }: Fail) -> Error {
     Error::input(Place::at(path, line, column), *fault)
 }
 
+/// Refuses a file that is known to be no recording.
+fn known(path: &Path, foreign: Option<Foreign>) -> Result<()> {
+    foreign.map_or(Ok(()), |Foreign { what, mend }| {
+        Err(Error::input(Place::file(path), RecordingFault::Foreign { what: what.into(), mend }))
+    })
+}
+
 fn stopped(path: &Path, stop: Stop, line: u64) -> Error {
     match stop {
         Stop::Io(source) => Error::file(path, source),
@@ -361,6 +374,10 @@ fn in_columns(path: &Path, form: Form, mut input: Input, offset: u64) -> Result<
         file.rewind().map_err(failed)?;
     }
     let mut text = Text::open(path, form, input)?;
+    if !text.has_head {
+        let what = format!("{} without the head of a recording", form.word());
+        return Err(Error::input(Place::file(path), RecordingFault::Foreign { what, mend: None }));
+    }
     io::copy(&mut text.by_ref().take(offset), &mut io::sink()).map_err(failed)?;
     Ok(Box::new(text))
 }

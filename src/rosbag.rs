@@ -17,7 +17,6 @@ mod schema;
 mod track;
 
 pub(crate) use bag::{Bag, Holds, Joints, Poses, Topic};
-pub(crate) use container::MAGIC;
 pub(crate) use frames::{Link, Step, along};
 pub(crate) use message::Posed;
 pub(crate) use track::{Around, Track};

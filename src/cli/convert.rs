@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::convert::{Nominal, Request, Written, open};
+use crate::convert::{Nominal, Request, Written, files_of, open_parts};
 use crate::machine::Machine;
 use serde_json::json;
 
@@ -14,9 +14,10 @@ use super::simulate;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Table of another program: text with any separator, .npy, .parquet, .arrow, .rtl, .rta, .rtx; or a recording
-    #[arg(value_name = "FILE")]
-    file: PathBuf,
+    /// Table of another program: text with any separator, .npy, .parquet, .arrow, .rtl, .rta, .rtx; a bag of ROS 2, its folder, or all its
+    /// files; or a recording
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
     /// Machine whose joints are in the table; what is written is read back with it
     #[arg(long, value_name = "MACHINE.ron")]
     machine: Option<PathBuf>,
@@ -174,7 +175,8 @@ impl Args {
 
     /// The command that this is, ready to be pasted, for a message about a bag: all that is told of one but its topics.
     fn call(&self) -> String {
-        let mut words = vec!["kincal".to_string(), "convert".into(), quoted(&self.file.to_string_lossy())];
+        let mut words = vec!["kincal".to_string(), "convert".into()];
+        words.extend(self.files.iter().map(|file| quoted(&file.to_string_lossy())));
         let mut flag = |name: &str, value: &str| words.extend([format!("--{name}"), quoted(value)]);
         let paths = [("machine", &self.machine), ("map", &self.map)];
         for (name, path) in paths.into_iter().filter_map(|(name, path)| Some((name, path.as_ref()?))) {
@@ -210,6 +212,7 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
     // A program that the path names is an input as any other.
     let ran = args.path.as_deref().and_then(simulate::input_of);
     let files = &files.with_inputs("--path", &ran.into_iter().collect::<Vec<_>>());
+    let files = &files.with_inputs("FILE", &files_of(&args.files)?);
     files.check()?;
     let machine =
         (args.machine.as_ref()).map(|path| open_machine(path, |path| Machine::open(path))).transpose()?;
@@ -217,12 +220,12 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
         (Some(text), Some(machine)) => Some(simulate::path(machine, text)?),
         _ => None,
     };
-    let converted = open(&args.file, machine.as_ref(), &args.request(path))?;
+    let converted = open_parts(&args.files, machine.as_ref(), &args.request(path))?;
     if args.write_map.is_some() && converted.map.is_empty() {
         return Err(Failure::Told {
             what: format!(
                 "{}: no map holds how this table is read: it is a recording already, or rows and columns change their places",
-                args.file.display()
+                args.files[0].display()
             ),
             mend: "leave --write-map out; the flags of this call say all".into(),
         });

@@ -12,6 +12,13 @@ use clap::{Arg, ArgMatches, Command};
 
 use super::failure::{Failure, Outcome, folder_of, not_written};
 
+/// What stands for standard input or standard output in the place of a file.
+pub(super) const DASH: &str = "-";
+
+pub(super) fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == DASH
+}
+
 /// An argument that names a file to be written.
 #[derive(Clone, Debug)]
 pub(crate) struct Output(PathBuf);
@@ -39,7 +46,7 @@ pub(crate) enum Destination {
 
 impl From<OsString> for Destination {
     fn from(text: OsString) -> Self {
-        if text == "-" { Destination::StandardOutput } else { Destination::File(text.into()) }
+        if text == DASH { Destination::StandardOutput } else { Destination::File(text.into()) }
     }
 }
 
@@ -65,9 +72,9 @@ impl Files {
             let of = |path: PathBuf| Named { argument: written(arg), path };
             files.inputs.extend(values::<PathBuf>(matches, arg).cloned().map(of));
             files.outputs.extend(values::<Output>(matches, arg).map(|output| of(output.0.clone())));
-            let files_of = values::<Destination>(matches, arg).filter_map(|destination| match destination {
-                Destination::StandardOutput => None,
-                Destination::File(output) => Some(of(output.0.clone())),
+            let files_of = values::<Destination>(matches, arg).map(|destination| match destination {
+                Destination::StandardOutput => of(DASH.into()),
+                Destination::File(output) => of(output.0.clone()),
             });
             files.outputs.extend(files_of);
         }
@@ -136,6 +143,9 @@ impl Named {
     }
 
     fn can_be_written(&self) -> Outcome {
+        if is_standard(&self.path) {
+            return Ok(());
+        }
         if self.path.is_dir() {
             return Err(not_written(&self.path, &std::io::ErrorKind::IsADirectory.into()));
         }
@@ -152,6 +162,9 @@ impl Named {
 /// The path without links, `.` and `..` of the file that is there or will be. Nothing where it is no file: several may write to a pipe or to
 /// `/dev/null`, and nothing there is lost.
 fn identity(path: &Path) -> Option<PathBuf> {
+    if is_standard(path) {
+        return Some(path.into());
+    }
     match std::fs::metadata(path) {
         Ok(known) if !known.is_file() => None,
         Ok(_) => path.canonicalize().ok(),

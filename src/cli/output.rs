@@ -13,24 +13,35 @@ use indicatif::ProgressBar;
 use super::Common;
 use super::failure::not_written;
 pub(crate) use super::failure::{Failure, Outcome};
-use super::files::Destination;
+use super::files::{Destination, is_standard};
 use super::part::Part;
+use super::streams::StandardOutput;
 
-/// The message, the line it is about, and the mend.
-pub(crate) fn complain(failure: &Failure) {
+/// The message, the line it is about, and the mend; `input` is the file that standard input is in.
+pub(crate) fn complain(failure: &Failure, input: &Path) {
     let mut err = std::io::stderr().lock();
     let (what, excerpt, mend) = match failure {
         Failure::Answer(text) => (text.clone(), None, String::new()),
         Failure::Told { what, mend } => (what.clone(), None, mend.clone()),
         Failure::Input(error) => (error.to_string(), error.place().and_then(excerpt), error.mend()),
     };
-    let _ = writeln!(err, "error: {what}");
+    let [what, mend] = [what, mend].map(|text| text.replace(&*input.to_string_lossy(), "standard input"));
+    // As the messages about the command line itself are.
+    let (red, plain) = if is_coloured(&err) { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
+    let _ = writeln!(err, "{red}error:{plain} {what}");
     if let Some(excerpt) = excerpt {
         let _ = writeln!(err, "{excerpt}");
     }
     if !mend.is_empty() {
         let _ = writeln!(err, "  = {mend}");
     }
+}
+
+/// Whether it is a terminal of which nobody has said that it has no colours (<https://no-color.org>).
+fn is_coloured(stream: &impl IsTerminal) -> bool {
+    let is_plain = std::env::var_os("NO_COLOR").is_some_and(|it| !it.is_empty())
+        || std::env::var_os("TERM").is_none_or(|it| it == "dumb");
+    cfg!(unix) && stream.is_terminal() && !is_plain
 }
 
 /// What a file seems to be, where one was given in the other's place.
@@ -87,10 +98,24 @@ pub(crate) fn open_recordings(
         if let Some(path) = at_fault {
             return misplaced(path, "machine file", "recording");
         }
+        // What is known by its first bytes has one way, or none.
+        if let Some(RecordingFault::Foreign { mend, .. }) = error.fault() {
+            return match (mend, error.place()) {
+                (None, Some(place)) => Failure::Told {
+                    what: error.to_string(),
+                    mend: converting("it becomes a recording by", &place.file, machine_file),
+                },
+                _ => error.into(),
+            };
+        }
         match foreign(&error) {
             Some(table) => Failure::Told {
                 what: error.to_string(),
-                mend: format!("{}\n  = {}", error.mend(), converting(table, machine_file)),
+                mend: format!(
+                    "{}\n  = {}",
+                    error.mend(),
+                    converting("a table of another program becomes a recording by", table, machine_file)
+                ),
             },
             None => error.into(),
         }
@@ -122,17 +147,18 @@ fn foreign(error: &Error) -> Option<&Path> {
 }
 
 /// The command that makes a recording of a table, ready to be pasted.
-fn converting(table: &Path, machine: &Path) -> String {
-    let name = table.file_stem().unwrap_or_default().to_string_lossy();
-    let output = table.with_file_name(format!("{name}_rec.csv"));
+fn converting(how: &str, table: &Path, machine: &Path) -> String {
+    // A folder may have no name of its own.
+    let output = match table.file_stem() {
+        Some(name) => table.with_file_name(format!("{}_rec.csv", name.to_string_lossy())),
+        None => table.join("rec.csv"),
+    };
     let [table, machine, output] = [table, machine, &output].map(|path| {
         let text = path.display().to_string();
         let plain = |c: char| c.is_alphanumeric() || "/._-+,:\\".contains(c);
         if text.chars().all(plain) { text } else { format!("'{text}'") }
     });
-    format!(
-        "a table of another program becomes a recording by: kincal convert {table} --machine {machine} -o {output}"
-    )
+    format!("{how}: kincal convert {table} --machine {machine} -o {output}")
 }
 
 /// The line of a text file that a message is about, with a mark below the column (machine files only: a recording's
@@ -183,20 +209,20 @@ impl<W: Write> Write for Watched<W> {
     }
 }
 
-/// Writes through `out`, and tells an error of the output as such.
+/// Writes through `out`, and tells an error of the output as such, by `failed`.
 fn write_into<T>(
-    file: std::fs::File,
-    path: &Path,
+    file: impl Write,
+    failed: impl Fn(std::io::Error) -> Failure,
     write: impl FnOnce(&mut dyn Write) -> crate::error::Result<T>,
 ) -> Outcome<T> {
     let inner = std::io::BufWriter::with_capacity(1 << 18, file);
     let mut out = Watched { inner, failed: None };
     let written = write(&mut out);
     if let Some(source) = out.failed.take() {
-        return Err(not_written(path, &source));
+        return Err(failed(source));
     }
     let told = written?;
-    out.flush().map_err(|source| not_written(path, &source))?;
+    out.flush().map_err(failed)?;
     Ok(told)
 }
 
@@ -217,10 +243,13 @@ pub(crate) fn write_checked<T>(
     check: impl FnOnce(&Path, &T) -> Outcome,
 ) -> Outcome<T> {
     let failed = |source: std::io::Error| not_written(path, &source);
+    if is_standard(path) {
+        return write_into(StandardOutput::new(), not_printed, write);
+    }
     let known = std::fs::metadata(path).ok();
     if known.as_ref().is_some_and(|it| !it.is_file() && !it.is_dir()) {
         let file = std::fs::OpenOptions::new().write(true).open(path).map_err(failed)?;
-        return write_into(file, path, write);
+        return write_into(file, failed, write);
     }
     let target = match &known {
         Some(_) => path.canonicalize().map_err(failed)?,
@@ -230,7 +259,7 @@ pub(crate) fn write_checked<T>(
     if let Some(known) = &known {
         file.set_permissions(known.permissions()).map_err(failed)?;
     }
-    let told = write_into(file, path, write)?;
+    let told = write_into(file, failed, write)?;
     check(part.path(), &told)?;
     part.finish(&target).map_err(failed)?;
     Ok(told)
@@ -324,12 +353,15 @@ pub(crate) fn print(text: &str) -> Outcome {
 /// What became of something that was sent to standard output.
 pub(super) fn printed(result: std::io::Result<()>) -> Outcome {
     match result {
-        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(Failure::Told {
-            what: format!("standard output cannot be written: {source}"),
-            mend: "send it where there is space; files that options name are written whole or not at all"
-                .into(),
-        }),
+        Err(source) if source.kind() != std::io::ErrorKind::BrokenPipe => Err(not_printed(source)),
         _ => Ok(()),
+    }
+}
+
+fn not_printed(source: std::io::Error) -> Failure {
+    Failure::Told {
+        what: format!("standard output cannot be written: {source}"),
+        mend: "send it where there is space; files that options name are written whole or not at all".into(),
     }
 }
 

@@ -20,12 +20,24 @@ impl Part {
     pub fn begin(target: &Path) -> Result<(Part, File)> {
         let mut name = target.file_name().unwrap_or_default().to_os_string();
         name.push(format!(".part{}", std::process::id()));
-        let path = target.with_file_name(name);
+        Part::new(&target.with_file_name(name), |path| File::create(path))
+    }
+
+    /// A file that lasts no longer than this.
+    pub fn new(path: &Path, create: impl FnOnce(&Path) -> Result<File>) -> Result<(Part, File)> {
         // Held until the file is there: an interruption finds it in the list, or comes before it.
         let mut unfinished = unfinished();
-        let file = File::create(&path)?;
-        unfinished.push(path.clone());
-        Ok((Part(path), file))
+        let file = create(path)?;
+        unfinished.insert(0, path.into());
+        Ok((Part(path.into()), file))
+    }
+
+    /// A folder that lasts no longer than this, and than the files in it.
+    pub fn folder(path: &Path) -> Result<Part> {
+        let mut unfinished = unfinished();
+        std::fs::create_dir(path)?;
+        unfinished.push(path.into());
+        Ok(Part(path.into()))
     }
 
     /// Where the file is until then.
@@ -42,9 +54,13 @@ impl Part {
 impl Drop for Part {
     fn drop(&mut self) {
         // Behind a rename there is nothing of this name.
-        let _ = std::fs::remove_file(&self.0);
+        remove(&self.0);
         unfinished().retain(|path| *path != self.0);
     }
+}
+
+fn remove(path: &Path) {
+    let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
 }
 
 /// From here on an interruption (Ctrl-C, `kill`) takes away what is not whole before it ends the program.
@@ -61,7 +77,7 @@ pub(super) fn tidy_when_interrupted() {
         // Never given back: nothing is begun between here and the end.
         let unfinished = unfinished();
         for path in unfinished.iter() {
-            let _ = std::fs::remove_file(path);
+            remove(path);
         }
         // Ended by the signal itself, so that a shell stops its loop; it calls this status 130 or 143.
         let _ = emulate_default_handler(signal);

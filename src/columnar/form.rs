@@ -4,9 +4,6 @@ use std::path::Path;
 
 use crate::error::{Error, Place, Result};
 
-/// Bytes from the beginning of a file that tell what it is.
-pub(crate) const START: usize = 8;
-
 /// A kind of file that holds a table in columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {

@@ -12,6 +12,8 @@ pub(crate) struct Text {
     lines: String,
     /// Bytes of these lines that have been read.
     read: usize,
+    /// Whether it has such lines `# key: value`: without them it is a table, and no recording.
+    pub has_head: bool,
 }
 
 impl Text {
@@ -19,10 +21,11 @@ impl Text {
     /// As [`Table::open`].
     pub fn open(file: &Path, form: Form, input: Input) -> Result<Text> {
         let table = Table::open(file, form, input)?;
-        let mut lines = table.head().unwrap_or_default();
+        let head = table.head();
+        let (has_head, mut lines) = (head.is_some(), head.unwrap_or_default());
         let names: Vec<String> = table.columns().into_iter().map(|column| column.name).collect();
         push_line(&names, &mut lines);
-        Ok(Text { table, lines, read: 0 })
+        Ok(Text { table, lines, read: 0, has_head })
     }
 }
 

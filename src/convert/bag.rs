@@ -26,8 +26,6 @@ use crate::rosbag::{self, Around, Bag, Joints, Link, Posed, Track};
 use crate::units::Quantity;
 use crate::wording::{count, shown};
 
-/// How a bag begins.
-pub(super) const MAGIC: &[u8] = rosbag::MAGIC;
 /// The longest gap over which a line is drawn is so many usual intervals, where nobody tells it.
 const GAP: i64 = 3;
 /// Stamps above this, ns, count from 1970, and not from the start of a simulation.
@@ -61,7 +59,7 @@ enum Without {
 
 pub(super) fn read(
     file: &Path,
-    input: impl Read,
+    parts: Vec<(&Path, Box<dyn Read + '_>)>,
     machine: Option<&Machine>,
     request: &Request,
 ) -> Result<Bagged> {
@@ -74,7 +72,7 @@ pub(super) fn read(
         let mend = "write --measurement pose, or position, which leaves the rotation out";
         return Err(fault(format!("--measurement: a bag has poses, and no {}", shown(word)), mend));
     }
-    let bag = Bag::read(file, input)?;
+    let bag = Bag::read(parts)?;
     let chosen = topics::choose(file, &bag, machine, request)?;
     let mut told = chosen.told;
     told.extend(bag.lost.clone());

@@ -8,10 +8,8 @@ use super::Request;
 use super::map::Map;
 use super::table::Table;
 use crate::error::{Error, Place, Result};
+use crate::foreign::{self, MCAP};
 use crate::machine::Machine;
-
-/// How a bag begins.
-pub(super) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 /// The table of a bag that nothing reads.
 pub(super) struct Bagged {
@@ -30,8 +28,13 @@ pub(super) fn order(_: &mut Map) {}
 
 /// # Errors
 /// Always: how to build a reader.
-pub(super) fn read(file: &Path, _: impl Read, _: Option<&Machine>, _: &Request) -> Result<Bagged> {
+pub(super) fn read(
+    file: &Path,
+    _: Vec<(&Path, Box<dyn Read + '_>)>,
+    _: Option<&Machine>,
+    _: &Request,
+) -> Result<Bagged> {
+    let mend = foreign::of(file, MCAP).and_then(|it| it.mend).unwrap_or_default();
     let what = "this is a bag of ROS 2 (MCAP), which this build of kincal does not read";
-    let mend = "build it with `--features rosbag`; the module for Python reads bags: `pip install ./python`";
     Err(Error::mistake(Place::file(file), what, mend))
 }

@@ -9,9 +9,6 @@ use super::table::{Table, Told};
 use crate::error::{Error, Place, Result};
 use crate::wording::shown;
 
-/// How such a file begins.
-pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
-
 /// A type of number, as wide as it is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Number {

@@ -45,7 +45,7 @@ impl<'a> Seen<'a> {
         let layout = layout(machine).map_err(|why| {
             refused(
                 format!("machine \"{}\" is none that {form} knows: {why}", machine.name()),
-                "controls know machines with X, Y, Z and one or two rotary axes; try --to urdf, dh, mdh, or iso230",
+                "controls know machines with X, Y, Z and one or two rotary axes; try --to urdf, mjcf, dh or mdh, and iso230 where two axes are linear",
             )
         })?;
         Ok(Seen { calibrated, layout, tool_length: options.tool_length })

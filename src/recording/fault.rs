@@ -23,6 +23,14 @@ pub enum RecordingFault {
     /// Nothing but blanks in the file.
     #[error("file is empty")]
     Empty,
+    /// A file of another program, known by how it begins.
+    #[error("this is {what}, and no recording")]
+    Foreign {
+        /// What it is, with its article.
+        what: String,
+        /// What makes of it something that is read; `None` where `kincal convert` reads it.
+        mend: Option<String>,
+    },
     /// Bytes that are no UTF-8.
     #[error("text is not UTF-8")]
     NotUtf8,
@@ -354,6 +362,9 @@ impl Fault for RecordingFault {
         match self {
             UnequalArrays { .. } => "give one value for each sample; NaN for a reading that is missing".into(),
             Empty => "a recording holds lines `# key: value`, one header row and rows of numbers".into(),
+            Foreign { mend, .. } => {
+                mend.clone().unwrap_or_else(|| "`kincal convert` makes a recording of it".into())
+            }
             NotUtf8 => "save the file as CSV in UTF-8 (plain ASCII is UTF-8; `um` for micrometres)".into(),
             LineTooLong { .. } => "write one sample per line; is this a text file at all?".into(),
             PreambleTooLong { .. } => "shorten the comments above the header row".into(),

@@ -12,15 +12,15 @@ use super::schema::Schema;
 use super::track::Track;
 use crate::error::{Error, Place, Result};
 
-/// All that is read of a file.
+/// All that is read of a file, or of the files of one recording.
 #[derive(Debug, Default)]
 pub(crate) struct Bag {
     /// By name.
     pub topics: Vec<Topic>,
     /// Of all topics of TF together.
     pub frames: Frames,
-    /// What of the file is lost, where its end is missing.
-    pub lost: Option<String>,
+    /// What is lost of each file whose end is missing.
+    pub lost: Vec<String>,
 }
 
 /// Messages of one name and type.
@@ -67,25 +67,37 @@ pub(crate) struct Poses {
 }
 
 impl Bag {
-    /// Reads all of a file; `file` is only the name that messages use.
+    /// Reads all of its files, one after the other, each with the name that messages use.
     ///
     /// # Errors
     /// [`Error::Input`] with the byte: what is damaged; [`Error::File`].
-    pub fn read(file: &Path, input: impl Read) -> Result<Bag> {
+    pub fn read<'a>(files: Vec<(&'a Path, impl Read + 'a)>) -> Result<Bag> {
         let mut reader = Reader::default();
-        let mut size = 0;
-        let counted = Counted { input, size: &mut size };
-        let end = container::records(counted, |record| reader.take(record)).map_err(|stop| match stop {
-            Stop::Read(source) => Error::file(file, source),
-            Stop::Fault(Fault { what, mend }) => Error::mistake(Place::file(file), what, mend),
-        })?;
-        let mut bag = reader.bag;
-        if let End::Cut { at } = end {
-            let lost = size - at.min(size);
-            let what = format!("the bag is cut off: it ends in a record that begins at byte {at} of {size}");
-            bag.lost =
-                Some(format!("{what}; these last {lost} bytes are lost, what stands before them is read"));
+        let several = files.len() > 1;
+        for (file, input) in files {
+            let mut size = 0;
+            let counted = Counted { input, size: &mut size };
+            let end =
+                container::records(counted, |record| reader.take(record)).map_err(|stop| match stop {
+                    Stop::Read(source) => Error::file(file, source),
+                    Stop::Fault(Fault { what, mend }) => Error::mistake(Place::file(file), what, mend),
+                })?;
+            // Each file numbers its types and channels anew.
+            reader.schemas.clear();
+            reader.channels.clear();
+            if let End::Cut { at } = end {
+                let lost = size - at.min(size);
+                let of = if several { file.display().to_string() } else { "the bag".into() };
+                let what = match size {
+                    0 => format!("{of} is empty: nothing came to be written to it"),
+                    _ => format!(
+                        "{of} is cut off: it ends in a record that begins at byte {at} of {size}; these last {lost} bytes are lost, what stands before them is read"
+                    ),
+                };
+                reader.bag.lost.push(what);
+            }
         }
+        let mut bag = reader.bag;
         bag.settle();
         Ok(bag)
     }

@@ -6,9 +6,8 @@
 use std::io::{self, Read};
 
 use super::Fault;
+use crate::foreign::MCAP;
 
-/// How such a file begins and ends.
-pub(crate) const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 /// A record of more bytes than these is no record but damage.
 const LARGEST: u64 = 1 << 32;
 /// A chunk that claims to be larger than this once it is decompressed: recorders make a few megabytes.
@@ -58,11 +57,14 @@ pub(super) fn records(
     mut take: impl FnMut(Record) -> Result<(), Fault>,
 ) -> Result<End, Stop> {
     let mut start = Vec::new();
-    read_up_to(&mut input, MAGIC.len() as u64, &mut start)?;
-    if start != MAGIC {
+    read_up_to(&mut input, MCAP.len() as u64, &mut start)?;
+    if start.is_empty() {
+        return Ok(End::Cut { at: 0 });
+    }
+    if start != MCAP {
         return Err(damaged(0, "it does not begin as an MCAP file does").into());
     }
-    let (mut at, mut head, mut body) = (MAGIC.len() as u64, Vec::new(), Vec::new());
+    let (mut at, mut head, mut body) = (MCAP.len() as u64, Vec::new(), Vec::new());
     loop {
         head.clear();
         read_up_to(&mut input, 9, &mut head)?;

@@ -3,6 +3,7 @@
 
 use std::ffi::{OsStr, OsString};
 use std::fs::OpenOptions;
+use std::io::Write;
 use std::os::unix::ffi::OsStrExt;
 use std::process::{Command, Stdio};
 
@@ -154,6 +155,60 @@ fn a_reader_that_has_seen_enough_is_no_fault() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
+}
+
+/// Runs a call with this on its standard input, temporary files in the folder; status, standard output, standard error.
+fn piped(folder: &Folder, call: &str, input: &[u8]) -> (Option<i32>, Vec<u8>, String) {
+    let mut run = Command::new(PROGRAM);
+    run.current_dir(&folder.0).args(call.split(' ')).env("TMPDIR", &folder.0);
+    let streams = run.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = streams.spawn().expect("it runs");
+    // A call that is refused does not read it.
+    let _ = child.stdin.take().expect("piped").write_all(input);
+    let output = child.wait_with_output().expect("it ends");
+    (output.status.code(), output.stdout, String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn a_dash_is_standard_input_and_standard_output() {
+    let folder = folder(b"");
+    let simulate = "simulate m.ron --test path --input table.csv --random 1 --noise 1um -o";
+    let done = |call: &str, input: &[u8]| {
+        let (status, out, err) = piped(&folder, call, input);
+        assert_eq!((status, &*err), (Some(0), ""), "{call}");
+        out
+    };
+    done(&format!("{simulate} rec.csv"), b"");
+    done("calibrate m.ron rec.csv -o cal.ron --json cal.json", b"");
+    let before = folder.names();
+    let recording = done(&format!("{simulate} -"), b"");
+    assert_eq!(recording, folder.read("rec.csv").into_bytes());
+    assert_eq!(done("calibrate m.ron - -o -", &recording), folder.read("cal.ron").into_bytes());
+    let json = done("calibrate m.ron - --json -", &recording);
+    let [own, of_file] = [&json, folder.read("cal.json").as_bytes()].map(|text| {
+        let value: serde_json::Value = serde_json::from_slice(text).expect("JSON");
+        value["rms_m"].clone()
+    });
+    assert!(own == of_file && own.is_object(), "{own}");
+    let machine = folder.read("m.ron");
+    assert_eq!(done("describe -", machine.as_bytes()), done("describe m.ron", b""));
+    assert_eq!(folder.names(), before, "nothing of it stays");
+}
+
+#[test]
+fn what_is_wrong_with_standard_input_and_output_is_told() {
+    let folder = folder(b"");
+    let text = "# measurement: joint\nx[mm],x_meas[furlong]\n0,0\n";
+    let (status, out, err) = piped(&folder, "calibrate m.ron - -o -", text.as_bytes());
+    assert_eq!((status, out), (Some(1), Vec::new()));
+    assert!(err.starts_with("error: standard input:2:2: column `x_meas` has unit `furlong`"), "{err}");
+    let (status, _, err) = piped(&folder, "calibrate - - -o cal.ron", b"");
+    assert_eq!(status, Some(2));
+    assert!(err.contains("standard input is one file, and another argument reads it already"), "{err}");
+    let (status, _, err) = piped(&folder, "calibrate m.ron - -o - --json -", text.as_bytes());
+    assert_eq!(status, Some(1));
+    assert!(err.starts_with("error: -: two outputs have this name, --"), "{err}");
+    printed_in_vain(&folder, ["simulate m.ron --test poses -o - --quiet"], 1);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use folder::Folder;
-use kincal::convert::{Converted, Request, open, read};
+use kincal::convert::{Converted, Request, open, open_parts, read};
 use kincal::{Error, Machine};
 
 fn project(path: &str) -> PathBuf {
@@ -220,6 +220,115 @@ fn what_is_whole_of_a_bag_is_read_and_damage_is_told() {
     }
     println!("{read_on} read, {refused} refused");
     assert!(read_on > 100 && refused > 300, "{read_on} {refused}");
+}
+
+/// A bag that its recorder has split, as a folder with what changes in it.
+struct Split {
+    folder: Folder,
+}
+
+impl Split {
+    fn new(name: &str) -> Split {
+        let folder = Folder::new(name);
+        let from = project("tests/rosbag/split/run");
+        for entry in std::fs::read_dir(from).expect("a folder") {
+            let path = entry.expect("readable").path();
+            std::fs::copy(&path, folder.0.join(path.file_name().expect("a name"))).expect("copied");
+        }
+        Split { folder }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.0.join(name)
+    }
+
+    fn converted(&self) -> Result<Converted, Error> {
+        open(&self.folder.0, Some(&scara()), &Request::default())
+    }
+}
+
+/// Three files, each with its own numbers of topics, are the recording of their motion, in whatever order they are named.
+#[test]
+fn a_bag_that_was_split_is_one_recording() {
+    let split = Split::new("split");
+    let expected = std::fs::read_to_string(project("tests/rosbag/expected.csv")).expect("readable");
+    let (head, rows) = parts(&expected);
+    let whole = split.converted().unwrap_or_else(|e| panic!("{e}"));
+    let (own_head, own_rows) = parts(&whole.recordings[0].text);
+    assert_eq!((own_head, own_rows.len()), (head, rows.len()));
+    for (a, b) in own_rows.iter().flatten().zip(rows.iter().flatten()) {
+        // Some roundings of numbers about one.
+        assert!((a - b).abs() < 2e-15, "{a} {b}");
+    }
+    let named = ["run_2.mcap", "run_0.mcap", "run_1.mcap"].map(|name| split.file(name));
+    let again = open_parts(&named, Some(&scara()), &Request::default()).expect("the same bag");
+    assert_eq!(again.recordings, whole.recordings);
+}
+
+/// What is missing of a split bag is told, and what cannot be one is refused.
+#[test]
+fn what_is_not_whole_of_a_split_bag_is_told() {
+    let mut said = String::new();
+    let mut tell = |case: &str, split: &Split| {
+        let text = match split.converted() {
+            Ok(found) => format!("{} rows\n  {}", found.recordings[0].rows, found.told.join("\n  ")),
+            Err(error) => format!("{error}\n  = {}", error.mend()),
+        };
+        let folder = split.folder.0.display().to_string();
+        said.push_str(&format!("{case}: {}\n", text.replace(&folder, "FOLDER")));
+    };
+    let without = |name: &str| {
+        let split = Split::new("without");
+        std::fs::remove_file(split.file(name)).expect("removed");
+        split
+    };
+    tell("the middle is missing", &without("run_1.mcap"));
+    tell("the end is missing", &without("run_2.mcap"));
+    let split = Split::new("cut");
+    let bytes = std::fs::read(split.file("run_2.mcap")).expect("readable");
+    std::fs::write(split.file("run_2.mcap"), &bytes[..bytes.len() / 4]).expect("written");
+    tell("the end is cut", &split);
+    std::fs::write(split.file("run_2.mcap"), "").expect("written");
+    tell("the end is empty", &split);
+    std::fs::copy(split.file("run_0.mcap"), split.file("other_0.mcap")).expect("copied");
+    tell("two bags", &split);
+    let split = Split { folder: Folder::new("older") };
+    tell("nothing", &split);
+    std::fs::write(split.file("run_0.db3"), b"SQLite format 3\0").expect("written");
+    tell("a database", &split);
+    std::fs::remove_file(split.file("run_0.db3")).expect("removed");
+    std::fs::write(split.file("run_0.mcap.zstd"), b"\x28\xb5\x2f\xfd").expect("written");
+    tell("compressed as a whole", &split);
+    let table = [project("tests/rosbag/split/run/run_0.mcap"), project("tests/rosbag/expected.csv")];
+    let error = open_parts(&table, Some(&scara()), &Request::default()).expect_err("a table beside a bag");
+    assert!(error.to_string().ends_with("of other files each is a recording of its own"), "{error}");
+    insta::assert_snapshot!(said);
+}
+
+/// A bag in the place of a recording is told as such, with the command that makes one of it.
+#[test]
+fn a_bag_in_the_place_of_a_recording_ends_in_a_command_to_paste() {
+    let split = Split::new("place");
+    let machine = project("machines/scara.ron");
+    let machine = machine.to_str().expect("UTF-8");
+    let run = |words: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_kincal")).current_dir(&split.folder.0).args(words).output();
+        let output = output.expect("it runs");
+        (output.status.code(), String::from_utf8(output.stderr).expect("UTF-8"))
+    };
+    for (named, says) in [(".", "a folder with a bag of ROS 2"), ("run_0.mcap", "a bag of ROS 2 (MCAP)")] {
+        let (status, text) = run(&["calibrate", machine, named, "-o", "calibrated.ron"]);
+        assert_eq!(status, Some(1), "{text}");
+        assert!(text.starts_with(&format!("error: {named}: this is {says}, and no recording\n")), "{text}");
+        let (_, command) =
+            text.trim_end().split_once("it becomes a recording by: kincal ").expect("a command");
+        let words: Vec<&str> = command.split_whitespace().chain(["--quiet"]).collect();
+        assert_eq!(run(&words), (Some(0), String::new()));
+        let output = words[words.len() - 2];
+        let written = std::fs::read_to_string(split.file(output)).expect("written");
+        assert!(written.contains("# measurement: pose"), "{written}");
+    }
 }
 
 /// The command that a message shows runs as it is.

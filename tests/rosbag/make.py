@@ -286,6 +286,20 @@ def good() -> None:
     bag.put("/rosout", "std_msgs/msg/String", ZERO, {"data": "hello"})
     bag.done()
 
+    # What `ros2 bag record --max-bag-duration` leaves. Each file has its own numbers of topics.
+    folder = HERE / "split" / "run"
+    folder.mkdir(parents=True, exist_ok=True)
+    ends = [POSE_STAMPS[0] - 1, POSE_STAMPS[6] - 1, POSE_STAMPS[11] - 1, JOINT_STAMPS[-1] + POSE_STAMPS[-1]]
+    names = [f"run_{number}.mcap" for number in range(3)]
+    for name, begin, end in zip(names, ends, ends[1:]):
+        def within(stamps: list[int]) -> list[int]:
+            return [at for at in stamps if begin < at <= end]
+        Bag(folder / name).joints(stamps=within(JOINT_STAMPS)).poses(stamps=within(POSE_STAMPS)).done()
+    paths = "".join(f"    - {name}\n" for name in names)
+    (folder / "metadata.yaml").write_text(
+        f"rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n  relative_file_paths:\n{paths}"
+    )
+
     bag = Bag(HERE / "transform_lz4.mcap", compression=CompressionType.LZ4).joints()
     for at in POSE_STAMPS:
         # Slashes before frames, as long ago; some messages come late.
