@@ -24,7 +24,7 @@ use directions::{Direction, Equations, MOST, norm};
 pub use options::{InverseOptions, Mode};
 
 inner! {
-    use many::{Foreseen, foresee};
+    use many::{Foreseen, foresee, slide_many};
 }
 
 /// Equations whose weakest direction is stronger than this part of the strongest are solved as they stand, to eleven digits; a Newton step
@@ -294,6 +294,17 @@ impl<'a> Inverse<'a> {
         })
     }
 
+    /// The three free commands where the tip alone counts and follows them along straight lines.
+    pub(crate) fn slides(&self, free: &[bool]) -> Option<[usize; 3]> {
+        let is_slide = |c: usize| self.machine.command_joint(c).kind == JointKind::Prismatic;
+        let mut free = (0..free.len()).filter(|c| free[*c]);
+        let (Some(x), Some(y), Some(z), None) = (free.next(), free.next(), free.next(), free.next()) else {
+            return None;
+        };
+        let is_one_step = self.mode == Mode::Position && self.straight && [x, y, z].into_iter().all(is_slide);
+        is_one_step.then_some([x, y, z])
+    }
+
     /// The commands of [`Inverse::solve`] where the tip alone counts and linear commands alone are free: one step, since the tip follows
     /// them along straight lines. `None` where it takes more than that, and where travel counts.
     pub(crate) fn slide(
@@ -303,17 +314,13 @@ impl<'a> Inverse<'a> {
         start: &[f64],
         free: &[bool],
     ) -> Option<Few<f64>> {
-        let is_slide = |c: usize| self.machine.command_joint(c).kind == JointKind::Prismatic;
-        let free_ones: Few<usize> = (0..free.len()).filter(|c| free[*c]).collect();
-        let is_one_step =
-            self.mode == Mode::Position && self.straight && free_ones.iter().all(|c| is_slide(*c));
-        let (true, [x, y, z]) = (is_one_step, &free_ones[..]) else { return None };
+        let [x, y, z] = self.slides(free)?;
         let look = self.look(chain, goal, start);
         let mut q = Few::from_slice(start);
         if look.gap_w.norm() < CLOSE {
             return Some(q);
         }
-        let [x_w, y_w, z_w] = [x, y, z].map(|c| look.speeds[*c].v);
+        let [x_w, y_w, z_w] = [x, y, z].map(|c| look.speeds[c].v);
         let volume = x_w.dot(y_w.cross(z_w));
         if volume.abs() < SPANS * x_w.norm() * y_w.norm() * z_w.norm() {
             return None;
@@ -327,13 +334,13 @@ impl<'a> Inverse<'a> {
             return None;
         }
         if longest >= NO_STEP {
-            [x, y, z].into_iter().zip(by).for_each(|(c, by)| q[*c] += by);
+            [x, y, z].into_iter().zip(by).for_each(|(c, by)| q[c] += by);
         }
         let stands = |c: &usize| {
             let (low, high) = self.machine.travel(*c);
             (low..=high).contains(&q[*c])
         };
-        let is_within = !self.options.within_travel || free_ones.iter().all(stands);
+        let is_within = !self.options.within_travel || [x, y, z].iter().all(stands);
         is_within.then_some(q)
     }
 
