@@ -21,10 +21,11 @@ use crate::few::Few;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use directions::{Direction, Equations, MOST, norm};
+pub(crate) use many::slide_many;
 pub use options::{InverseOptions, Mode};
 
 inner! {
-    use many::{Foreseen, foresee, slide_many};
+    use many::{Foreseen, foresee};
 }
 
 /// Equations whose weakest direction is stronger than this part of the strongest are solved as they stand, to eleven digits; a Newton step
@@ -315,19 +316,22 @@ impl<'a> Inverse<'a> {
         free: &[bool],
     ) -> Option<Few<f64>> {
         let [x, y, z] = self.slides(free)?;
-        let look = self.look(chain, goal, start);
-        let mut q = Few::from_slice(start);
-        if look.gap_w.norm() < CLOSE {
+        let (path, mut q) = (chain.path(), Few::from_slice(start));
+        let mut moved = Few::from_elem(Moved::none(0.0), path.joint_count().max(1));
+        path.go_to(start, &mut moved);
+        let mut speeds = Few::from_elem(Vec3::zero(0.0), start.len());
+        let gap_w =
+            goal.w_from_tip.translation - path.slides(goal.t_from_tip.translation, &moved, &mut speeds);
+        if gap_w.norm() < CLOSE {
             return Some(q);
         }
-        let [x_w, y_w, z_w] = [x, y, z].map(|c| look.speeds[c].v);
+        let (x_w, y_w, z_w) = (speeds[x], speeds[y], speeds[z]);
         let volume = x_w.dot(y_w.cross(z_w));
         if volume.abs() < SPANS * x_w.norm() * y_w.norm() * z_w.norm() {
             return None;
         }
-        let by =
-            [y_w.cross(z_w), z_w.cross(x_w), x_w.cross(y_w)].map(|across| across.dot(look.gap_w) / volume);
-        let left = look.gap_w - x_w.times(by[0]) - y_w.times(by[1]) - z_w.times(by[2]);
+        let by = [y_w.cross(z_w), z_w.cross(x_w), x_w.cross(y_w)].map(|across| across.dot(gap_w) / volume);
+        let left = gap_w - x_w.times(by[0]) - y_w.times(by[1]) - z_w.times(by[2]);
         let longest = by.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         // Steps beyond that are shortened, and ones that are no numbers go nowhere.
         if !(left.norm() < CLOSE && longest < LONGEST) {

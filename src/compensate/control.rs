@@ -348,6 +348,33 @@ impl<'a> Control<'a> {
         program
     }
 
+    /// As [`Control::program`], of rotary axes alone; the others are `other`.
+    pub fn angles(&self, q: &[f64], other: &[f64]) -> Few<f64> {
+        if self.axes.iter().any(|axis| axis.is_rotary() && axis.tip().is_some()) {
+            return self.program(q, other);
+        }
+        let mut program = Few::from_slice(other);
+        for (i, axis) in self.axes.iter().enumerate().filter(|(_, axis)| axis.is_rotary()) {
+            if let Some((c, sign)) = axis.command() {
+                program[i] = sign * q[c] - self.offset[i] - self.frame.shift(i);
+            }
+        }
+        program
+    }
+
+    /// Joint commands `q` with those of rotary axes as these program coordinates have them.
+    pub fn turned(&self, q: &[f64], program: &[f64]) -> Few<f64> {
+        let mut q = Few::from_slice(q);
+        for (i, axis) in
+            self.axes.iter().enumerate().filter(|(_, axis)| axis.is_rotary() && axis.tip().is_none())
+        {
+            if let Some((c, sign)) = axis.command() {
+                q[c] = sign * (program[i] + self.offset[i] + self.frame.shift(i));
+            }
+        }
+        q
+    }
+
     /// The joints at a part `s` of a straight move, as the control moves them.
     pub fn between(&self, a: &Position, b: &Position, s: f64) -> Option<Few<f64>> {
         let q = mixed(a.q(), b.q(), s);

@@ -11,7 +11,7 @@ use super::position::Position;
 use crate::chain::{Moved, Path};
 use crate::few::Few;
 use crate::inverse::{Goal, slide_many};
-use crate::lie::{Pose, Twist, Vec3};
+use crate::lie::{Pose, Vec3};
 use crate::scalar::{Lanes, MOST_LANES, Scalar};
 
 /// Parts of a straight move at which it is looked at.
@@ -193,16 +193,17 @@ impl WithSimd for Look<'_> {
         let joints = self.nominal.joint_count();
         let mut moved: Few<Moved<Lanes<S>>> = Few::from_elem(Moved::none(none), joints.max(1));
         let mut q: Few<Lanes<S>> = Few::from_elem(none, self.commands);
-        let mut velocities: Few<Twist<Lanes<S>>> = Few::from_elem(Twist::zero(none), joints);
-        let mut speeds: Few<Twist<Lanes<S>>> = Few::from_elem(Twist::zero(none), self.commands);
+        let mut speeds: Few<Vec3<Lanes<S>>> = Few::from_elem(Vec3::zero(none), self.commands);
         for from in (0..self.count).step_by(S::F64_LANES) {
             let lanes = from..from + S::F64_LANES;
-            let goal = |i: usize| Lanes::load(simd, &self.goals[i][lanes.clone()]);
-            let (tip, axis) = (Vec3([goal(0), goal(1), goal(2)]), Vec3([goal(3), goal(4), goal(5)]));
-            let position =
-                |p: usize, i: usize| Lanes::load(simd, &self.positions[p * self.width + i][lanes.clone()]);
-            for (c, q) in q.iter_mut().enumerate() {
-                *q = position(1, c);
+            let tip = triple(simd, self.goals, [0, 1, 2], from);
+            let axis = triple(simd, self.goals, [3, 4, 5], from);
+            let (meant, others) = self.positions.split_at(self.width);
+            let (written, others) = others.split_at(self.width);
+            let (meant_start, written_start) = others.split_at(self.width);
+            let (meant, written) = ([meant_start, meant], [written_start, written]);
+            for (q, column) in q.iter_mut().zip(written[1]) {
+                *q = Lanes::load(simd, &column[lanes.clone()]);
             }
             self.nominal.go_to(&q, &mut moved);
             for (path, found) in
@@ -220,31 +221,18 @@ impl WithSimd for Look<'_> {
             }
             let (mut worst, mut far) = (none, none);
             for s in PARTS {
-                let between = |p: usize, i: usize| {
-                    let (start, end) = (position(p + 2, i), position(p, i));
-                    start + (end - start).scale(s)
-                };
-                let wanted = if let Some((place, slides, [x, y, z])) = self.place {
+                let wanted = if let Some((place, slides, axes)) = self.place {
                     let place = place.lift(none);
-                    let coordinates = |p: usize| Vec3([between(p, x), between(p, y), between(p, z)]);
-                    for (c, q) in q.iter_mut().enumerate() {
-                        *q = between(1, c);
-                    }
-                    let (wanted, sent) = (place.transform(coordinates(0)), place.transform(coordinates(1)));
+                    go_between(simd, written, s, from, &mut q);
                     self.nominal.go_to(&q, &mut moved);
                     let at = (t_from_tip.translation, &moved[..]);
-                    let takes_more =
-                        slide_many(self.nominal, at, sent, slides, &mut q, &mut velocities, &mut speeds);
-                    far = far + takes_more;
-                    wanted
+                    let sent = place.transform(triple_between(simd, written, axes, s, from));
+                    far = far + slide_many(self.nominal, at, sent, slides, &mut q, &mut speeds);
+                    place.transform(triple_between(simd, meant, axes, s, from))
                 } else {
-                    for (c, q) in q.iter_mut().enumerate() {
-                        *q = between(0, c);
-                    }
+                    go_between(simd, meant, s, from, &mut q);
                     self.nominal.go_to(&q, &mut moved);
-                    for (c, q) in q.iter_mut().enumerate() {
-                        *q = between(1, c);
-                    }
+                    go_between(simd, written, s, from, &mut q);
                     self.nominal.point_w(t_from_tip.translation, &moved)
                 };
                 self.nominal.go_to(&q, &mut moved);
@@ -255,5 +243,43 @@ impl WithSimd for Look<'_> {
             worst.store(&mut self.found.mid_line[lanes.clone()]);
             far.store(&mut self.found.far[lanes.clone()]);
         }
+    }
+}
+
+/// Columns of some moves.
+type Columns = [[f64; MOST_LANES]];
+
+/// Three columns, of the moves from `from` on.
+#[inline(always)]
+fn triple<S: Simd>(simd: S, columns: &Columns, [x, y, z]: [usize; 3], from: usize) -> Vec3<Lanes<S>> {
+    let lanes = from..from + S::F64_LANES;
+    Vec3([
+        Lanes::load(simd, &columns[x][lanes.clone()]),
+        Lanes::load(simd, &columns[y][lanes.clone()]),
+        Lanes::load(simd, &columns[z][lanes]),
+    ])
+}
+
+/// As [`triple`], a part `s` of the way from the first to the second.
+#[inline(always)]
+fn triple_between<S: Simd>(
+    simd: S,
+    [start, end]: [&Columns; 2],
+    axes: [usize; 3],
+    s: f64,
+    from: usize,
+) -> Vec3<Lanes<S>> {
+    let (start, end) = (triple(simd, start, axes, from), triple(simd, end, axes, from));
+    start + (end - start).times(start.0[0].lift(s))
+}
+
+/// Joints a part `s` of the way from the first to the second.
+#[inline(always)]
+fn go_between<S: Simd>(simd: S, [start, end]: [&Columns; 2], s: f64, from: usize, q: &mut [Lanes<S>]) {
+    let lanes = from..from + S::F64_LANES;
+    for ((q, start), end) in q.iter_mut().zip(start).zip(end) {
+        let start = Lanes::load(simd, &start[lanes.clone()]);
+        let end = Lanes::load(simd, &end[lanes.clone()]);
+        *q = start + (end - start).scale(s);
     }
 }

@@ -273,7 +273,7 @@ impl<'a, 'm> Pass<'a, 'm> {
         }
         let (model, control) = (self.corrector.model(), self.program.control());
         let nearest = model.nearest_seen(q);
-        let mut joints = Vec::new();
+        let mut beyond: Few<usize> = Few::new();
         for (c, (q, seen)) in q.iter().zip(&nearest).enumerate() {
             let off = (q - seen).abs();
             let rotary = control.machine().command_joint(c).kind == JointKind::Revolute;
@@ -281,8 +281,9 @@ impl<'a, 'm> Pass<'a, 'm> {
             if by < NO_WAY || TAU - by < NO_WAY {
                 continue;
             }
-            let joint = control.machine().commands()[c].clone();
-            match self.told.report.extrapolated_joints.iter_mut().find(|beyond| beyond.joint == joint) {
+            beyond.push(c);
+            let joint = &control.machine().commands()[c];
+            match self.told.report.extrapolated_joints.iter_mut().find(|beyond| beyond.joint == *joint) {
                 Some(beyond) => beyond.by.take(by, line),
                 None => {
                     let by = Worst { value: by, line };
@@ -293,7 +294,6 @@ impl<'a, 'm> Pass<'a, 'm> {
                     });
                 }
             }
-            joints.push(joint);
         }
         if self.options.force || self.program.places().any_parked() {
             return Ok(());
@@ -302,6 +302,7 @@ impl<'a, 'm> Pass<'a, 'm> {
         let continued = TipError::between(tip(model.chain()), tip(&model.chain_at(&nearest)));
         let bound_m = expected(control, q);
         if continued.m() > bound_m {
+            let joints = beyond.iter().map(|c| control.machine().commands()[*c].clone()).collect();
             return refuse(block, 0, CompensateFault::Unseen { joints, by_m: continued.m(), bound_m });
         }
         Ok(())

@@ -95,6 +95,13 @@ impl UnseenSums {
     }
 }
 
+/// `sum + effect * by`.
+#[inline(always)]
+fn gone_on<T: Scalar>(sum: Vec3<T>, [a, b, c]: [T; 3], by: T) -> Vec3<T> {
+    let [x, y, z] = sum.0;
+    Vec3([a.mul_add(by, x), b.mul_add(by, y), c.mul_add(by, z)])
+}
+
 /// What patterns do to tip and tool axis at the ends of some moves, a move on each lane.
 struct Shifts<'a> {
     path: &'a Path,
@@ -112,11 +119,12 @@ impl WithSimd for Shifts<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let none = Lanes::splat(simd, 0.0);
         let t_from_tip = self.t_from_tip.lift(none);
-        let width = 6 * self.path.dyad_count();
+        let dyads = self.path.dyad_count();
         let mut moved: Few<Moved<Lanes<S>>> =
             Few::from_elem(Moved::none(none), self.path.joint_count().max(1));
-        // (14): what each deviation does to the tip along x, y, z of the workpiece, and how it turns the tool about them.
-        let mut rows = vec![none; 6 * width];
+        let mut row = vec![none; 6 * dyads];
+        // (14): by deviation what it does to the tip along x, y, z of the workpiece, and how it turns the tool about them.
+        let mut effects = vec![[none; 6]; 6 * dyads];
         let mut parts = [[0.0; MOST_LANES]; 2];
         for from in (0..self.count).step_by(S::F64_LANES) {
             let lanes = from..from + S::F64_LANES;
@@ -124,23 +132,25 @@ impl WithSimd for Shifts<'_> {
             self.path.go_to(&q, &mut moved);
             let w_from_tip = self.path.w_from_t(&moved, none) * t_from_tip;
             let (tip, axis) = (w_from_tip.translation, w_from_tip.rotation.column(2));
-            for (k, row) in rows.chunks_exact_mut(width).enumerate() {
+            for k in 0..6 {
                 let mut along = Vec3([none; 3]);
                 along.0[k % 3] = none.offset(1.0);
                 let wrench = if k < 3 { Wrench::at_point(along, tip) } else { Wrench::couple(along) };
-                self.path.row(wrench, &moved, row);
+                self.path.row(wrench, &moved, &mut row);
+                effects.iter_mut().zip(&row).for_each(|(effect, x)| effect[k] = *x);
             }
             for (sum, pattern) in self.sums.iter_mut().zip(self.patterns) {
                 let (mut v, mut w) = (Vec3([none; 3]), Vec3([none; 3]));
-                for (j, dh) in pattern.iter().enumerate() {
-                    let of = |k: usize| &rows[k * width + 6 * j..][..6];
-                    let (shifts, turns) = ([of(0), of(1), of(2)], [of(3), of(4), of(5)]);
-                    for i in 0..3 {
-                        let (by_v, by_w) = (none.lift(dh.v.0[i]), none.lift(dh.w.0[i]));
-                        for k in 0..3 {
-                            v.0[k] = shifts[k][i].mul_add(by_v, shifts[k][i + 3].mul_add(by_w, v.0[k]));
-                            w.0[k] = turns[k][i + 3].mul_add(by_w, w.0[k]);
-                        }
+                for (dh, effects) in pattern.iter().zip(effects.chunks_exact(6)) {
+                    let (shifts, turns) = effects.split_at(3);
+                    for (by, effect) in dh.v.0.iter().zip(shifts) {
+                        let by = none.lift(*by);
+                        v = gone_on(v, [effect[0], effect[1], effect[2]], by);
+                    }
+                    for (by, effect) in dh.w.0.iter().zip(turns) {
+                        let by = none.lift(*by);
+                        v = gone_on(v, [effect[0], effect[1], effect[2]], by);
+                        w = gone_on(w, [effect[3], effect[4], effect[5]], by);
                     }
                 }
                 let turned = w.cross(axis);

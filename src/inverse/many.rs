@@ -51,22 +51,19 @@ pub fn foresee(
 /// The linear commands [`Inverse::slides`] in the place of those in `q` that bring the point `p_t` of the tool to `goal_w`, m, one step
 /// from where the joints are `moved` to; travel does not count. 0 where that is all, more where it takes a closer look.
 #[inline(always)]
-pub fn slide_many<T: Scalar>(
+pub(crate) fn slide_many<T: Scalar>(
     path: &Path,
     (p_t, moved): (Vec3<T>, &[Moved<T>]),
     goal_w: Vec3<T>,
     slides: [usize; 3],
     q: &mut [T],
-    velocities: &mut [Twist<T>],
-    speeds: &mut [Twist<T>],
+    speeds: &mut [Vec3<T>],
 ) -> T {
     let none = goal_w.0[0].lift(0.0);
     let one = none.offset(1.0);
-    let gap = goal_w - path.velocities(p_t, moved, velocities).translation;
-    speeds.fill(Twist::zero(none));
-    path.by_command(velocities, speeds);
+    let gap = goal_w - path.slides(p_t, moved, speeds);
     let [cx, cy, cz] = slides;
-    let (x, y, z) = (speeds[cx].v, speeds[cy].v, speeds[cz].v);
+    let (x, y, z) = (speeds[cx], speeds[cy], speeds[cz]);
     let (yz, volume) = (y.cross(z), x.dot(y.cross(z)));
     let over = volume.recip();
     let by = [yz.dot(gap) * over, z.cross(x).dot(gap) * over, x.cross(y).dot(gap) * over];
