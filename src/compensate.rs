@@ -79,6 +79,8 @@ mod unseen;
 mod corrector;
 mod envelope;
 
+mod looks;
+
 mod words;
 
 // The program as it is followed, what there is to tell and what stands behind some lines of it.
@@ -315,7 +317,7 @@ fn correct<R: BufRead + Send>(
             let mut passage = Passage::new(open()?, &mut calls);
             loop {
                 if ends_batch(passage.passed(), &foot) {
-                    writer.end_batch();
+                    writer.end_batch()?;
                 }
                 if foot.is_before(passage.passed() + 1) {
                     sign(writer.has_corrected(), out)?;
@@ -330,7 +332,7 @@ fn correct<R: BufRead + Send>(
     if foot.is_last() {
         sign(writer.has_corrected(), out)?;
     }
-    let mut report = writer.finish();
+    let mut report = writer.finish()?;
     report.blocks = blocks as u64;
     if dialect == Dialect::Rs274 && options.integer_unit.is_none() {
         report.numbers_without_point = without_point;

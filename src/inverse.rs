@@ -21,6 +21,7 @@ use crate::few::Few;
 use crate::lie::{Pose, Twist, Vec3};
 use crate::machine::{JointKind, Machine};
 use directions::{Direction, Equations, MOST, norm};
+pub(crate) use many::slide_many;
 pub use options::{InverseOptions, Mode};
 
 inner! {
@@ -294,6 +295,17 @@ impl<'a> Inverse<'a> {
         })
     }
 
+    /// The three free commands where the tip alone counts and follows them along straight lines.
+    pub(crate) fn slides(&self, free: &[bool]) -> Option<[usize; 3]> {
+        let is_slide = |c: usize| self.machine.command_joint(c).kind == JointKind::Prismatic;
+        let mut free = (0..free.len()).filter(|c| free[*c]);
+        let (Some(x), Some(y), Some(z), None) = (free.next(), free.next(), free.next(), free.next()) else {
+            return None;
+        };
+        let is_one_step = self.mode == Mode::Position && self.straight && [x, y, z].into_iter().all(is_slide);
+        is_one_step.then_some([x, y, z])
+    }
+
     /// The commands of [`Inverse::solve`] where the tip alone counts and linear commands alone are free: one step, since the tip follows
     /// them along straight lines. `None` where it takes more than that, and where travel counts.
     pub(crate) fn slide(
@@ -303,37 +315,36 @@ impl<'a> Inverse<'a> {
         start: &[f64],
         free: &[bool],
     ) -> Option<Few<f64>> {
-        let is_slide = |c: usize| self.machine.command_joint(c).kind == JointKind::Prismatic;
-        let free_ones: Few<usize> = (0..free.len()).filter(|c| free[*c]).collect();
-        let is_one_step =
-            self.mode == Mode::Position && self.straight && free_ones.iter().all(|c| is_slide(*c));
-        let (true, [x, y, z]) = (is_one_step, &free_ones[..]) else { return None };
-        let look = self.look(chain, goal, start);
-        let mut q = Few::from_slice(start);
-        if look.gap_w.norm() < CLOSE {
+        let [x, y, z] = self.slides(free)?;
+        let (path, mut q) = (chain.path(), Few::from_slice(start));
+        let mut moved = Few::from_elem(Moved::none(0.0), path.joint_count().max(1));
+        path.go_to(start, &mut moved);
+        let mut speeds = Few::from_elem(Vec3::zero(0.0), start.len());
+        let gap_w =
+            goal.w_from_tip.translation - path.slides(goal.t_from_tip.translation, &moved, &mut speeds);
+        if gap_w.norm() < CLOSE {
             return Some(q);
         }
-        let [x_w, y_w, z_w] = [x, y, z].map(|c| look.speeds[*c].v);
+        let (x_w, y_w, z_w) = (speeds[x], speeds[y], speeds[z]);
         let volume = x_w.dot(y_w.cross(z_w));
         if volume.abs() < SPANS * x_w.norm() * y_w.norm() * z_w.norm() {
             return None;
         }
-        let by =
-            [y_w.cross(z_w), z_w.cross(x_w), x_w.cross(y_w)].map(|across| across.dot(look.gap_w) / volume);
-        let left = look.gap_w - x_w.times(by[0]) - y_w.times(by[1]) - z_w.times(by[2]);
+        let by = [y_w.cross(z_w), z_w.cross(x_w), x_w.cross(y_w)].map(|across| across.dot(gap_w) / volume);
+        let left = gap_w - x_w.times(by[0]) - y_w.times(by[1]) - z_w.times(by[2]);
         let longest = by.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         // Steps beyond that are shortened, and ones that are no numbers go nowhere.
         if !(left.norm() < CLOSE && longest < LONGEST) {
             return None;
         }
         if longest >= NO_STEP {
-            [x, y, z].into_iter().zip(by).for_each(|(c, by)| q[*c] += by);
+            [x, y, z].into_iter().zip(by).for_each(|(c, by)| q[c] += by);
         }
         let stands = |c: &usize| {
             let (low, high) = self.machine.travel(*c);
             (low..=high).contains(&q[*c])
         };
-        let is_within = !self.options.within_travel || free_ones.iter().all(stands);
+        let is_within = !self.options.within_travel || [x, y, z].iter().all(stands);
         is_within.then_some(q)
     }
 

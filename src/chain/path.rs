@@ -242,6 +242,34 @@ impl Path {
         Pose { rotation: Mat3([x.0, y.0, z.0]).transpose(), translation: end_w }
     }
 
+    /// Where the point `p_t` of the tool is in `w`, m, and in `speeds` its velocity by the speed of each command as far as that drives
+    /// slides, `docs/model.md` (13).
+    #[inline(always)]
+    pub fn slides<T: Scalar>(&self, p_t: Vec3<T>, moved: &[Moved<T>], speeds: &mut [Vec3<T>]) -> Vec3<T> {
+        let like = p_t.0[0];
+        speeds.fill(Vec3::zero(like));
+        let [x, y, z] = Mat3::identity(like).0;
+        let (mut here, mut p_w) = ([Vec3(x), Vec3(y), Vec3(z)], Vec3::zero(like));
+        for span in &self.spans {
+            for (joint, way) in &span.slides {
+                let way_w = along(here, way.lift(like));
+                for (command, factor) in &self.joints[*joint].terms {
+                    speeds[*command] = speeds[*command] + way_w.times(like.lift(*factor));
+                }
+            }
+            p_w = p_w + along(here, span.shifted(moved));
+            let rotation = span.rotation.lift(like);
+            let [x, y, z] = [rotation.column(0), rotation.column(1), rotation.column(2)];
+            here = [along(here, x), along(here, y), along(here, z)];
+            if let Some(turn) = span.turn {
+                let ([x, y, z], Moved { first: sine, second: cosine }) = (here, moved[turn.joint]);
+                let sine = if turn.back { -sine } else { sine };
+                here = [x.times(cosine) + y.times(sine), y.times(cosine) - x.times(sine), z];
+            }
+        }
+        p_w + along(here, p_t)
+    }
+
     /// Adds up what belongs to joints by command.
     #[inline(always)]
     pub fn by_command<T: Scalar>(&self, velocities: &[Twist<T>], commands: &mut [Twist<T>]) {

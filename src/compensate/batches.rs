@@ -193,6 +193,7 @@ impl<'a> How<'_, '_, 'a> {
         let (mut bytes, mut none) = (Vec::new(), SubPrograms::default());
         bytes.reserve(blocks.iter().map(|block| block.bytes().len() + 8).sum());
         let all = blocks.iter_mut().try_for_each(|block| none.block(&mut writer, block, 0, &mut bytes));
+        let all = all.and_then(|()| writer.look());
         let (part, end) = writer.stop();
         Written { bytes, part, end, error: all.err() }
     }

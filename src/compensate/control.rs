@@ -248,6 +248,30 @@ impl<'a> Control<'a> {
         Goal { t_from_tip: self.tip(), w_from_tip: self.tip_pose(q) }
     }
 
+    /// The linear commands that tip coordinates alone decide on, where these follow them along straight lines.
+    pub fn slides(&self) -> Option<[usize; 3]> {
+        let mut free = Few::from_elem(false, self.machine.commands().len());
+        let tips = self.axes.iter().filter(|axis| axis.tip().is_some());
+        tips.filter_map(Axis::command).for_each(|(c, _)| free[c] = true);
+        self.inverse.slides(&free)
+    }
+
+    /// Where coordinates of the tip lie in `w`; tool centre point function on.
+    pub fn w_from_coordinates(&self) -> Pose<f64> {
+        self.w_from_program * self.frame.pose()
+    }
+
+    /// The axes X, Y, Z.
+    pub fn triple_axes(&self) -> [usize; 3] {
+        let mut triple = [0; 3];
+        for (i, axis) in self.axes.iter().enumerate() {
+            if let Some(k) = axis.tip() {
+                triple[k] = i;
+            }
+        }
+        triple
+    }
+
     /// The three coordinates of the tip among `program`.
     fn triple(&self, program: &[f64]) -> Vec3<f64> {
         let mut p = [0.0; 3];
@@ -324,6 +348,33 @@ impl<'a> Control<'a> {
         program
     }
 
+    /// As [`Control::program`], of rotary axes alone; the others are `other`.
+    pub fn angles(&self, q: &[f64], other: &[f64]) -> Few<f64> {
+        if self.axes.iter().any(|axis| axis.is_rotary() && axis.tip().is_some()) {
+            return self.program(q, other);
+        }
+        let mut program = Few::from_slice(other);
+        for (i, axis) in self.axes.iter().enumerate().filter(|(_, axis)| axis.is_rotary()) {
+            if let Some((c, sign)) = axis.command() {
+                program[i] = sign * q[c] - self.offset[i] - self.frame.shift(i);
+            }
+        }
+        program
+    }
+
+    /// Joint commands `q` with those of rotary axes as these program coordinates have them.
+    pub fn turned(&self, q: &[f64], program: &[f64]) -> Few<f64> {
+        let mut q = Few::from_slice(q);
+        for (i, axis) in
+            self.axes.iter().enumerate().filter(|(_, axis)| axis.is_rotary() && axis.tip().is_none())
+        {
+            if let Some((c, sign)) = axis.command() {
+                q[c] = sign * (program[i] + self.offset[i] + self.frame.shift(i));
+            }
+        }
+        q
+    }
+
     /// The joints at a part `s` of a straight move, as the control moves them.
     pub fn between(&self, a: &Position, b: &Position, s: f64) -> Option<Few<f64>> {
         let q = mixed(a.q(), b.q(), s);
@@ -341,7 +392,7 @@ impl<'a> Control<'a> {
         parts: [f64; N],
     ) -> [Vec3<f64>; N] {
         if self.tcp {
-            let place = self.w_from_program * self.frame.pose();
+            let place = self.w_from_coordinates();
             return parts.map(|s| place.transform(self.triple(&mixed(a.program(), b.program(), s))));
         }
         self.nominal.tool_points(&parts.map(|s| mixed(a.q(), b.q(), s)), self.tip().translation)

@@ -34,7 +34,12 @@ impl AxisNumber {
 
     /// Programmed units, with a decimal point.
     pub fn text(&self) -> &str {
-        std::str::from_utf8(&self.text).unwrap_or_default()
+        std::str::from_utf8(self.ascii()).unwrap_or_default()
+    }
+
+    /// As [`AxisNumber::text`].
+    pub fn ascii(&self) -> &[u8] {
+        &self.text
     }
 }
 
@@ -143,13 +148,17 @@ impl<'a, 'm> Corrector<'a, 'm> {
         self.foreseen = found.into();
     }
 
-    /// What was foreseen of a position, if it was.
+    /// What was foreseen of a position, if it was; told once.
     fn foreseen(&mut self, control: &Control, meant: &[f64], free: &[bool]) -> Option<(Goal, Solution)> {
         let is_same = |a: &[f64]| a.iter().zip(meant).all(|(a, b)| a.to_bits() == b.to_bits());
         let at = self.foreseen.iter().take(FORESEEN).position(|next| is_same(&next.meant))?;
-        self.foreseen.drain(..at);
-        let next = self.foreseen.front().filter(|next| next.goal.t_from_tip == control.tip())?;
-        free.iter().all(|free| *free).then(|| (next.goal, next.solution.clone()))
+        (0..at).for_each(|_| drop(self.foreseen.pop_front()));
+        let is_wanted =
+            |next: &Foreseen| next.goal.t_from_tip == control.tip() && free.iter().all(|free| *free);
+        if !self.foreseen.front().is_some_and(is_wanted) {
+            return None;
+        }
+        self.foreseen.pop_front().map(|next| (next.goal, next.solution))
     }
 
     /// The position that was corrected last.
@@ -271,26 +280,25 @@ impl<'a, 'm> Corrector<'a, 'm> {
         let word = |i: usize| block.zip(words.get(i).copied().flatten()).map(|(b, w)| &b.words()[w]);
         let rotary = |i: usize| control.axes()[i].is_rotary();
         // Angles first; lengths then make up for what rounding does to them.
-        let turned = control.program(&exact, &coordinates);
+        let turned = control.angles(&exact, &coordinates);
         for i in (0..coordinates.len()).filter(|i| rotary(*i)) {
             coordinates[i] = number((program, style), (i, slip[i]), turned[i], word(i), &mut numbers);
         }
         if (0..coordinates.len()).any(rotary) {
-            let mut rounded = turned;
-            for i in (0..coordinates.len()).filter(|i| rotary(*i)) {
-                rounded[i] = coordinates[i];
-            }
-            if let Some(there) = control.joints(&rounded, &exact) {
-                let mut slides = Few::from_slice(&free);
-                slides.iter_mut().enumerate().for_each(|(c, free)| *free &= self.is_prismatic(c));
-                if slides.iter().filter(|s| **s).count() == 3 {
-                    let slid = self.solvers.slides.slide(&chain, &goal, &there, &slides);
-                    exact = slid.unwrap_or_else(|| {
-                        self.solvers.slides.solve(&chain, &goal, &there, &slides).commands.into()
-                    });
-                } else {
-                    exact = there;
+            let mut slides = Few::from_slice(&free);
+            slides.iter_mut().enumerate().for_each(|(c, free)| *free &= self.is_prismatic(c));
+            if slides.iter().filter(|s| **s).count() == 3 {
+                let there = control.turned(&exact, &coordinates);
+                let slid = self.solvers.slides.slide(&chain, &goal, &there, &slides);
+                exact = slid.unwrap_or_else(|| {
+                    self.solvers.slides.solve(&chain, &goal, &there, &slides).commands.into()
+                });
+            } else {
+                let mut rounded = control.program(&exact, &coordinates);
+                for i in (0..coordinates.len()).filter(|i| rotary(*i)) {
+                    rounded[i] = coordinates[i];
                 }
+                exact = control.joints(&rounded, &exact).unwrap_or(exact);
             }
         }
         let moved = control.program(&exact, &coordinates);

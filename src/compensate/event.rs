@@ -1,7 +1,12 @@
 //! What a block makes happen, in the order in which it does.
 
+use smallvec::SmallVec;
+
 use crate::few::Few;
 use crate::nc::{Motion, MotionKind};
+
+/// What a block makes happen, seldom more than one thing.
+pub(super) type Events = SmallVec<[Event; 1]>;
 
 /// One thing that a block makes happen.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@
 use super::call::{self, is_drilling};
 use super::code::{ends, has_g, refers};
 use super::control::Control;
-use super::event::Event;
+use super::event::{Event, Events};
 use super::fault::CompensateFault;
 use super::frame::Change;
 use super::places::Places;
@@ -124,8 +124,8 @@ impl<'a> Interpreter<'a> {
     ///
     /// # Errors
     /// [`Error::Input`](crate::error::Error::Input) where it cannot be read or followed.
-    pub fn block(&mut self, block: &Block) -> Result<Vec<Event>> {
-        let mut events = Vec::new();
+    pub fn block(&mut self, block: &Block) -> Result<Events> {
+        let mut events = Events::new();
         if self.ended {
             return Ok(events);
         }
@@ -235,7 +235,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// Modes that this block has changed.
-    fn change_modes(&mut self, block: &Block, before: &Modes, events: &mut Vec<Event>) {
+    fn change_modes(&mut self, block: &Block, before: &Modes, events: &mut Events) {
         let now = self.state.modes();
         let mut changed = false;
         if let Some(units) = now.units
@@ -333,7 +333,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// A call that is left alone leaves every axis somewhere.
-    fn call(&mut self, block: &Block, events: &mut Vec<Event>) -> Result<()> {
+    fn call(&mut self, block: &Block, events: &mut Events) -> Result<()> {
         let name = call::name_of(block);
         if self.dialect == Dialect::Siemens && is_drilling(&name) {
             self.leave_normal();
@@ -376,7 +376,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// Axes named (all, if none is) stand at a reference point; at the first one the set-up may say where that is.
-    fn refer(&mut self, block: &Block, events: &mut Vec<Event>) {
+    fn refer(&mut self, block: &Block, events: &mut Events) {
         let first = has_g(block, 28.0) || has_g(block, 74.0);
         let is_named = |address: &str| block.words().iter().any(|w| w.address == address);
         let none = !self.control.axes().iter().any(|a| is_named(a.address()));
@@ -399,7 +399,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// `G53`, `SUPA`: the numbers are places of the machine, and stay.
-    fn machine_move(&mut self, block: &Block, motion: &Motion, events: &mut Vec<Event>) {
+    fn machine_move(&mut self, block: &Block, motion: &Motion, events: &mut Events) {
         for (i, word) in motion.words.iter().enumerate() {
             let Some(word) = *word else { continue };
             self.places.park(i);

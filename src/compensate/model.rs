@@ -34,6 +34,11 @@ pub trait Model {
         &[]
     }
 
+    /// Whether [`Model::chain`] holds at every position.
+    fn is_constant(&self) -> bool {
+        false
+    }
+
     /// Which set of deviations [`Model::chain`] comes from; where it changes, the correction steps.
     fn piece(&self) -> usize;
 

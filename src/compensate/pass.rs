@@ -2,12 +2,15 @@
 
 use std::f64::consts::TAU;
 use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
 
 use super::corrector::{Correction, Corrector, Solvers};
 use super::envelope::{Envelope, expected};
 use super::event::Event;
 use super::fault::CompensateFault;
 use super::interpreter::Interpreter;
+use super::looks::{Looks, Move, Seen, mid_line};
 use super::model::Model;
 use super::motion_word::{first_of, motion_word};
 use super::options::{CompensateOptions, UnknownAxes};
@@ -25,11 +28,12 @@ use super::tip_error::TipError;
 use super::unseen::UnseenSums;
 use super::words;
 use crate::chain::Chain;
-use crate::error::Result;
+use crate::error::{Error, Place, Result};
 use crate::few::Few;
 use crate::inverse::{Outcome, Solution};
 use crate::machine::JointKind;
 use crate::nc::{Block, Motion, MotionKind, Number};
+use crate::scalar::MOST_LANES;
 
 /// Whole turns are told from others within this, rad; lengths from none, m.
 const NO_WAY: f64 = 1e-9;
@@ -48,6 +52,9 @@ pub(super) struct Pass<'a, 'm> {
     envelope: Envelope,
     /// The last line that went beyond what the calibration has seen.
     extrapolated: usize,
+    /// Straight moves that were corrected and are looked at later.
+    looks: Looks,
+    file: Option<Arc<Path>>,
 }
 
 impl<'a, 'm> Pass<'a, 'm> {
@@ -99,20 +106,29 @@ impl<'a, 'm> Pass<'a, 'm> {
             before: Part::default(),
             envelope: Envelope::new(machine, options.max_correction),
             extrapolated: 0,
+            looks: Looks::default(),
+            file: None,
         }
     }
 
-    /// What stands behind the last line, and what there is to tell since this or [`Pass::end_batch`] began.
-    pub fn stop(self) -> (Part, Standing<'a>) {
+    /// What stands behind the last line, and what there is to tell since this or [`Pass::end_batch`] began, [`Pass::look`] included.
+    pub fn stop(mut self) -> (Part, Standing<'a>) {
+        self.settle_unseen();
         let Pass { program, style, written_motion, corrector, .. } = self;
         (self.told, Standing { program, style, written_motion, last: corrector.into_last() })
     }
 
     /// Sums over moves begin anew here, so that they are the same however many batches are corrected side by side.
-    pub fn end_batch(&mut self) {
+    ///
+    /// # Errors
+    /// As [`Pass::look`].
+    pub fn end_batch(&mut self) -> Result<()> {
+        self.look()?;
+        self.settle_unseen();
         let report = Report { machine: self.told.report.machine.clone(), ..Report::default() };
         let told = std::mem::replace(&mut self.told, Part { report, unseen: UnseenSums::default() });
         self.before.absorb(told);
+        Ok(())
     }
 
     /// Looks at positions that lie ahead, as [`Corrector::foresee`].
@@ -157,6 +173,10 @@ impl<'a, 'm> Pass<'a, 'm> {
         block: &mut Block,
         out: &mut dyn Write,
     ) -> Result<Option<(Motion, Few<f64>, bool)>> {
+        // Under what holds now.
+        if !self.looks.is_empty() && !block.is_plain_motion() {
+            self.look()?;
+        }
         for event in self.program.block(block)? {
             match event {
                 Event::Units => self.style.forget_lengths(),
@@ -253,7 +273,7 @@ impl<'a, 'm> Pass<'a, 'm> {
         }
         let (model, control) = (self.corrector.model(), self.program.control());
         let nearest = model.nearest_seen(q);
-        let mut joints = Vec::new();
+        let mut beyond: Few<usize> = Few::new();
         for (c, (q, seen)) in q.iter().zip(&nearest).enumerate() {
             let off = (q - seen).abs();
             let rotary = control.machine().command_joint(c).kind == JointKind::Revolute;
@@ -261,8 +281,9 @@ impl<'a, 'm> Pass<'a, 'm> {
             if by < NO_WAY || TAU - by < NO_WAY {
                 continue;
             }
-            let joint = control.machine().commands()[c].clone();
-            match self.told.report.extrapolated_joints.iter_mut().find(|beyond| beyond.joint == joint) {
+            beyond.push(c);
+            let joint = &control.machine().commands()[c];
+            match self.told.report.extrapolated_joints.iter_mut().find(|beyond| beyond.joint == *joint) {
                 Some(beyond) => beyond.by.take(by, line),
                 None => {
                     let by = Worst { value: by, line };
@@ -273,7 +294,6 @@ impl<'a, 'm> Pass<'a, 'm> {
                     });
                 }
             }
-            joints.push(joint);
         }
         if self.options.force || self.program.places().any_parked() {
             return Ok(());
@@ -282,6 +302,7 @@ impl<'a, 'm> Pass<'a, 'm> {
         let continued = TipError::between(tip(model.chain()), tip(&model.chain_at(&nearest)));
         let bound_m = expected(control, q);
         if continued.m() > bound_m {
+            let joints = beyond.iter().map(|c| control.machine().commands()[*c].clone()).collect();
             return refuse(block, 0, CompensateFault::Unseen { joints, by_m: continued.m(), bound_m });
         }
         Ok(())
@@ -387,26 +408,102 @@ impl<'a, 'm> Pass<'a, 'm> {
     /// # Errors
     /// [`CompensateFault::TooFar`] where it is further off than any machine of these tolerances would be.
     pub fn arrive(&mut self, block: &Block, meant: Position, correction: Correction) -> Result<()> {
-        let line = block.line();
-        let control = self.program.control();
+        self.look()?;
         let (goal, written) = (*correction.goal(), correction.into_written());
+        let control = self.program.control();
+        let is_placed = !self.program.places().any_parked();
+        let left = is_placed.then(|| self.corrector.error(&goal, written.q()));
+        let by = TipError::between(control.tip_pose(written.q()), goal.w_from_tip);
+        let seen = Seen {
+            line: block.line(),
+            meant: Few::from_slice(meant.q()),
+            left: left.map(|left| (left.m(), left.rad())),
+            correction: (by.m(), by.rad()),
+            mid_line_m: None,
+        };
+        self.file.get_or_insert_with(|| block.file());
+        self.see(seen)?;
+        self.reach(meant, written);
+        Ok(())
+    }
+
+    /// As [`Pass::arrive`], by a straight move. `starts`: from where, as meant and as written, where what lies between counts.
+    ///
+    /// # Errors
+    /// As [`Pass::arrive`], and of moves before it.
+    pub fn arrive_straight(
+        &mut self,
+        block: &Block,
+        starts: Option<[&Position; 2]>,
+        meant: Position,
+        correction: Correction,
+    ) -> Result<()> {
+        if !self.corrector.model().is_constant() {
+            if let Some([start, written_start]) = starts {
+                let written = (written_start, correction.written());
+                let left = mid_line(self.program.control(), &self.corrector, (start, &meant), written);
+                self.told.report.largest_mid_line_m.take(left, block.line());
+            }
+            return self.arrive(block, meant, correction);
+        }
+        let is_placed = !self.program.places().any_parked();
+        let (goal, ends) = (correction.goal(), [&meant, correction.written()]);
+        let are_enough = self.looks.wait(Move { line: block.line(), goal, ends, starts, is_placed });
+        self.file.get_or_insert_with(|| block.file());
+        if are_enough {
+            self.look()?;
+        }
+        self.reach(meant, correction.into_written());
+        Ok(())
+    }
+
+    /// Looks at the moves that wait for it.
+    ///
+    /// # Errors
+    /// As [`Pass::arrive`], of the first one that is too far.
+    pub fn look(&mut self) -> Result<()> {
+        if self.looks.is_empty() {
+            return Ok(());
+        }
+        let mut looks = std::mem::take(&mut self.looks);
+        let mut all = Vec::with_capacity(MOST_LANES);
+        looks.look(self.program.control(), &self.corrector, |seen| all.push(seen));
+        self.looks = looks;
+        all.into_iter().try_for_each(|seen| self.see(seen))
+    }
+
+    /// Notes what there is to see of a move.
+    fn see(&mut self, seen: Seen) -> Result<()> {
+        let (line, report) = (seen.line, &mut self.told.report);
         // Where an axis stands at a place of the machine, the tip is nowhere that matters.
-        if !self.program.places().any_parked() {
-            let left = self.corrector.error(&goal, written.q());
-            self.told.report.largest_left_m.take(left.m(), line);
-            self.told.report.largest_left_rad.take(left.rad(), line);
+        if let Some((left_m, left_rad)) = seen.left {
+            report.largest_left_m.take(left_m, line);
+            report.largest_left_rad.take(left_rad, line);
         }
-        let correction = TipError::between(control.tip_pose(written.q()), goal.w_from_tip);
-        if let Some(bound_m) = self.envelope.exceeded(control, meant.q(), correction.m()) {
-            return refuse(block, 0, CompensateFault::TooFar { by_m: correction.m(), bound_m });
+        let (by_m, by_rad) = seen.correction;
+        if let Some(bound_m) = self.envelope.exceeded(self.program.control(), &seen.meant, by_m) {
+            let file = self.file.as_deref().unwrap_or(Path::new(""));
+            return Err(Error::input(Place::at(file, line, 1), CompensateFault::TooFar { by_m, bound_m }));
         }
-        self.told.report.largest_correction_m.take(correction.m(), line);
-        self.told.report.largest_correction_rad.take(correction.rad(), line);
+        report.largest_correction_m.take(by_m, line);
+        report.largest_correction_rad.take(by_rad, line);
+        if let Some(mid_line_m) = seen.mid_line_m {
+            report.largest_mid_line_m.take(mid_line_m, line);
+        }
+        Ok(())
+    }
+
+    fn settle_unseen(&mut self) {
+        if let Some(patterns) = self.corrector.unseen() {
+            self.told.unseen.settle(self.program.control(), patterns);
+        }
+    }
+
+    fn reach(&mut self, meant: Position, written: Position) {
         if let Some(patterns) = self.corrector.unseen().filter(|p| !p.is_empty()) {
-            self.told.unseen.add(control, patterns, written.q());
+            self.told.unseen.add(self.program.control(), patterns, written.q());
         }
         self.program.arrive(meant, written);
-        Ok(())
     }
 
     /// Takes a place as reached at which a cycle has run.
@@ -416,8 +513,11 @@ impl<'a, 'm> Pass<'a, 'm> {
     }
 
     /// The report of what was followed.
-    pub fn finish(mut self) -> Report {
-        self.end_batch();
+    ///
+    /// # Errors
+    /// As [`Pass::look`].
+    pub fn finish(mut self) -> Result<Report> {
+        self.end_batch()?;
         let Part { mut report, unseen } = self.before;
         let machine = self.corrector.machine();
         report.unseen = self.corrector.unseen().map(|patterns| unseen.report(machine, patterns));
@@ -430,6 +530,6 @@ impl<'a, 'm> Pass<'a, 'm> {
                 .map(|(_, axis)| axis.address().to_string())
                 .collect();
         }
-        report
+        Ok(report)
     }
 }

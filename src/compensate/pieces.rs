@@ -171,6 +171,10 @@ impl Model for Constant<'_> {
         bent.map_or_else(|| Cow::Borrowed(self.chain()), Cow::Owned)
     }
 
+    fn is_constant(&self) -> bool {
+        self.calibrated.variation().motions.is_empty()
+    }
+
     fn piece(&self) -> usize {
         0
     }

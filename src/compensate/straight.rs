@@ -6,6 +6,7 @@ use super::code::acts_behind;
 use super::fault::CompensateFault;
 use super::feed::{self, Way};
 use super::lines;
+use super::looks::mid_line;
 use super::output::{put, put_bytes};
 use super::pass::Pass;
 use super::position::Position;
@@ -15,8 +16,6 @@ use crate::error::Result;
 use crate::few::Few;
 use crate::nc::{Block, Dialect, Motion, MotionKind};
 
-/// Parts of a straight move at which it is looked at.
-const LOOKS: [f64; 3] = [0.25, 0.5, 0.75];
 /// Most parts of a straight move.
 const MOST_PARTS: usize = 4096;
 
@@ -28,7 +27,6 @@ pub(super) fn write(
     target: Few<f64>,
     out: &mut dyn Write,
 ) -> Result<()> {
-    let line = block.line();
     let (meant, written) = (pass.program().meant().clone(), pass.program().written().clone());
     let known = !pass.program().places().any_parked() && pass.corrector().has_last();
     let q = pass.program().joints(block, &target)?;
@@ -70,10 +68,6 @@ pub(super) fn write(
     }
     pass.restate(block, motion)?;
     pass.put_words(block, motion, &correction)?;
-    if feeds && known {
-        let left = mid_line(pass, (&meant, &end), (&written, correction.written()));
-        pass.report().largest_mid_line_m.take(left, line);
-    }
     let goes = |from, to| Way { from, to };
     let meant_way = goes(&meant, &end);
     let restored =
@@ -82,7 +76,8 @@ pub(super) fn write(
         } else {
             None
         };
-    pass.arrive(block, end, correction)?;
+    let starts = (feeds && known).then_some([&meant, &written]);
+    pass.arrive_straight(block, starts, end, correction)?;
     put(block, out)?;
     match restored {
         Some(line) => {
@@ -109,18 +104,8 @@ fn unsplit(pass: &Pass, at: &dyn Fn(f64) -> Few<f64>, count: usize) -> f64 {
     let Some(mut from) = corrected(0.0) else { return worst };
     for k in 1..=count {
         let Some(to) = corrected(k as f64 / count as f64) else { return worst };
-        worst = worst.max(mid_line(pass, (&from.0, &to.0), (&from.1, &to.1)));
+        worst = worst.max(mid_line(control, corrector, (&from.0, &to.0), (&from.1, &to.1)));
         from = to;
     }
     worst
-}
-
-/// Largest error of the tip between the ends of a straight move, m.
-fn mid_line(pass: &Pass, meant: (&Position, &Position), written: (&Position, &Position)) -> f64 {
-    let control = pass.program().control();
-    let goals_w = control.tips_between(meant.0, meant.1, LOOKS);
-    let sent = LOOKS.map(|s| control.between(written.0, written.1, s));
-    let [Some(a), Some(b), Some(c)] = sent else { return 0.0 };
-    let tips_w = pass.corrector().tips_w(control, &[a, b, c]);
-    goals_w.into_iter().zip(tips_w).map(|(goal, tip)| (tip - goal).norm()).fold(0.0, f64::max)
 }

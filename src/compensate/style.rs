@@ -67,6 +67,12 @@ impl Style {
         if self.comma { Cow::Owned(text.replace('.', ",")) } else { Cow::Borrowed(text) }
     }
 
+    /// As [`Style::pointed`].
+    pub fn pointed_ascii<'t>(&self, text: &'t [u8]) -> Cow<'t, [u8]> {
+        let comma = |b: &u8| if *b == b'.' { b',' } else { *b };
+        if self.comma { Cow::Owned(text.iter().map(comma).collect()) } else { Cow::Borrowed(text) }
+    }
+
     /// A number for an axis as its neighbour `model` is written.
     pub fn like(&self, text: &str, model: Option<Number>, control: &Control, axis: usize) -> String {
         match (model, text.parse::<f64>()) {

@@ -23,6 +23,16 @@ impl Ways {
     /// By command: whether its position is known, and whether its way there from the position last told is.
     fn judge(&self, control: &Control, places: &Places) -> (Few<bool>, Few<bool>) {
         let axes = || control.axes().iter().enumerate();
+        let mut known = Few::from_elem(false, self.known.len());
+        let mut ways = Few::from_slice(&known);
+        // As nearly everywhere in a program.
+        if places.sure().iter().zip(&self.sure).all(|(now, before)| *now && *before) {
+            for (_, axis) in axes() {
+                let Some((c, _)) = axis.command() else { continue };
+                (known[c], ways[c]) = (true, self.known[c]);
+            }
+            return (known, ways);
+        }
         // Where the tip is programmed, the places of the linear joints follow from all of its words. A rotary axis that the
         // program has not named is taken as standing at zero until it does.
         let tip = control.tcp()
@@ -33,8 +43,6 @@ impl Ways {
             });
         let turned =
             control.tcp() && axes().any(|(i, axis)| axis.is_rotary() && places.is_sure(i) && !self.sure[i]);
-        let mut known = Few::from_elem(false, self.known.len());
-        let mut ways = Few::from_slice(&known);
         for (i, axis) in axes() {
             let Some((c, _)) = axis.command() else { continue };
             let by_tip = control.tcp() && axis.tip().is_some();

@@ -18,14 +18,14 @@ pub(super) fn put_into(
 ) -> Result<()> {
     let model = model_of(block, words);
     for number in numbers {
-        let (axis, text) = (number.axis(), number.text());
+        let axis = number.axis();
         if let Some(word) = words[axis] {
-            block.replace_number(word, &style.pointed(text))?;
+            block.replace_number(word, &style.pointed_ascii(number.ascii()))?;
             report.corrected_words += 1;
             continue;
         }
         let address = control.axes()[axis].address();
-        let text = style.like(text, model, control, axis);
+        let text = style.like(number.text(), model, control, axis);
         let text = style.pointed(&text);
         // Behind the nearest axis before it, else before the first one, else at the end.
         let before = words[..axis].iter().rev().flatten().next().copied();

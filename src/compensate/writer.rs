@@ -53,8 +53,19 @@ impl<'a, 'm> Writer<'a, 'm> {
     }
 
     /// As [`Pass::end_batch`].
-    pub fn end_batch(&mut self) {
-        self.pass.end_batch();
+    ///
+    /// # Errors
+    /// As [`Pass::end_batch`].
+    pub fn end_batch(&mut self) -> Result<()> {
+        self.pass.end_batch()
+    }
+
+    /// As [`Pass::look`].
+    ///
+    /// # Errors
+    /// As [`Pass::look`].
+    pub fn look(&mut self) -> Result<()> {
+        self.pass.look()
     }
 
     /// As [`Pass::foresee`].
@@ -73,7 +84,10 @@ impl<'a, 'm> Writer<'a, 'm> {
     }
 
     /// The report of what was written.
-    pub fn finish(self) -> Report {
+    ///
+    /// # Errors
+    /// As [`Pass::finish`].
+    pub fn finish(self) -> Result<Report> {
         self.pass.finish()
     }
 }
@@ -84,20 +98,25 @@ impl<'a> Follow<'a> for Writer<'a, '_> {
     }
 
     fn block(&mut self, block: &mut Block, out: &mut dyn Write) -> Result<()> {
-        let pass = &mut self.pass;
-        let Some((motion, target, drills)) = pass.begin(block, out)? else { return Ok(()) };
-        if drills {
-            return cycle::write(pass, block, &motion, target, out);
+        let done = write(&mut self.pass, block, out);
+        // What is wrong with lines before comes first.
+        if done.is_err() { self.pass.look().and(done) } else { done }
+    }
+}
+
+fn write(pass: &mut Pass, block: &mut Block, out: &mut dyn Write) -> Result<()> {
+    let Some((motion, target, drills)) = pass.begin(block, out)? else { return Ok(()) };
+    if drills {
+        return cycle::write(pass, block, &motion, target, out);
+    }
+    match motion.kind {
+        MotionKind::Rapid | MotionKind::Linear | MotionKind::Unstated => {
+            straight::write(pass, block, &motion, target, out)
         }
-        match motion.kind {
-            MotionKind::Rapid | MotionKind::Linear | MotionKind::Unstated => {
-                straight::write(pass, block, &motion, target, out)
-            }
-            MotionKind::ArcCw | MotionKind::ArcCcw => curve::write(pass, block, &motion, target, out),
-            MotionKind::Cycle | MotionKind::Other => {
-                let what = format!("the motion `{}`", line_text(block));
-                refuse(block, 0, CompensateFault::OtherMotion { what })
-            }
+        MotionKind::ArcCw | MotionKind::ArcCcw => curve::write(pass, block, &motion, target, out),
+        MotionKind::Cycle | MotionKind::Other => {
+            let what = format!("the motion `{}`", line_text(block));
+            refuse(block, 0, CompensateFault::OtherMotion { what })
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::{PAIRS, TENS, Text};
 
-/// Pairs of digits of a count of units.
-const PAIRS_OF_UNITS: usize = 7;
+/// Digits of a count of units with zeros before them: an even number, more than units have.
+const DIGITS: usize = 14;
 
 /// Most digits behind the point that whole numbers give.
 const MOST: usize = 9;
@@ -58,24 +58,33 @@ impl Rounded {
     /// As text, behind a sign, if it has one. `has_point`: whether there is a point even where nothing is behind it; `has_zero`: whether
     /// there is a zero before it even where other digits are behind it.
     pub fn text(self, sign: Option<u8>, has_point: bool, has_zero: bool) -> Text {
-        let mut digits = [b'0'; 2 * PAIRS_OF_UNITS];
-        let mut rest = self.units;
-        for pair in digits.chunks_exact_mut(2).rev() {
-            pair.copy_from_slice(&PAIRS[(rest % 100) as usize]);
+        // What stands behind the digits is copied with them, a whole register at a time, and then left out.
+        let (mut digits, mut text) = ([b'0'; 2 * DIGITS], [b'0'; 2 * DIGITS]);
+        let (mut rest, mut first) = (self.units, DIGITS);
+        while rest >= 100 {
+            first -= 2;
+            digits[first..first + 2].copy_from_slice(&PAIRS[(rest % 100) as usize]);
             rest /= 100;
         }
-        // Units are below 10^12, so that there is a zero before them.
-        let point = digits.len() - self.places;
-        let first = digits[..point].iter().position(|digit| *digit != b'0').unwrap_or(point);
-        let first = if first == point && (has_zero || self.places == 0) { point - 1 } else { first };
-        let mut text = Text::new();
-        text.extend(sign);
-        text.extend_from_slice(&digits[first..point]);
-        if has_point || self.places > 0 {
-            text.push(b'.');
+        first -= 2;
+        digits[first..first + 2].copy_from_slice(&PAIRS[rest as usize]);
+        first += usize::from(rest < 10);
+        let point = DIGITS - self.places;
+        if first >= point {
+            first = point - usize::from(has_zero || self.places == 0);
         }
-        text.extend_from_slice(&digits[point..]);
-        text
+        let mut end = 0;
+        if let Some(sign) = sign {
+            (text[0], end) = (sign, 1);
+        }
+        text[end..end + DIGITS].copy_from_slice(&digits[first..first + DIGITS]);
+        end += point - first;
+        if has_point || self.places > 0 {
+            text[end] = b'.';
+            end += 1;
+        }
+        text[end..end + MOST].copy_from_slice(&digits[point..point + MOST]);
+        Text::from_slice(&text[..end + self.places])
     }
 }
 

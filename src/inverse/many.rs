@@ -5,7 +5,7 @@
 
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{CLOSE, Goal, Inverse, Mode, Outcome, SPANS, Solution};
+use super::{CLOSE, Goal, Inverse, LONGEST, Mode, Outcome, SPANS, Solution};
 use crate::chain::{Chain, Moved, Path};
 use crate::few::Few;
 use crate::lie::{Mat3, Pose, Twist, Vec3};
@@ -46,6 +46,35 @@ pub fn foresee(
     let (nominal, actual) = (nominal.path(), actual.path());
     Arch::new().dispatch(Many { inverse, nominal, actual, t_from_tip, slides, meant, found: &mut found });
     found
+}
+
+/// The linear commands [`Inverse::slides`] in the place of those in `q` that bring the point `p_t` of the tool to `goal_w`, m, one step
+/// from where the joints are `moved` to; travel does not count. 0 where that is all, more where it takes a closer look.
+#[inline(always)]
+pub(crate) fn slide_many<T: Scalar>(
+    path: &Path,
+    (p_t, moved): (Vec3<T>, &[Moved<T>]),
+    goal_w: Vec3<T>,
+    slides: [usize; 3],
+    q: &mut [T],
+    speeds: &mut [Vec3<T>],
+) -> T {
+    let none = goal_w.0[0].lift(0.0);
+    let one = none.offset(1.0);
+    let gap = goal_w - path.slides(p_t, moved, speeds);
+    let [cx, cy, cz] = slides;
+    let (x, y, z) = (speeds[cx], speeds[cy], speeds[cz]);
+    let (yz, volume) = (y.cross(z), x.dot(y.cross(z)));
+    let over = volume.recip();
+    let by = [yz.dot(gap) * over, z.cross(x).dot(gap) * over, x.cross(y).dot(gap) * over];
+    // Negative where the directions are weak or the way is far.
+    let spans = volume * volume - (x.dot(x) * y.dot(y) * z.dot(z)).scale(SPANS * SPANS);
+    let mut far = spans.select_below(0.0, one, none);
+    for (c, by) in slides.into_iter().zip(by) {
+        q[c] = q[c] + by;
+        far = (by * by).scale(-1.0).offset(LONGEST * LONGEST).select_below(0.0, one, far);
+    }
+    far
 }
 
 impl Inverse<'_> {

@@ -2,6 +2,7 @@
 
 use super::modes::{Coordinate, Distance, Modes, Why};
 use super::words::{How, Word};
+use crate::few::Few;
 
 /// The axes that are followed, and their programmed positions.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,7 +33,7 @@ impl Axes {
     }
 
     /// The programmed positions where they are known.
-    pub fn target(&self) -> Vec<Option<f64>> {
+    pub fn target(&self) -> Few<Option<f64>> {
         self.coordinates.iter().map(|c| c.value()).collect()
     }
 

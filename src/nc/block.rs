@@ -23,7 +23,7 @@ pub struct Block {
     words: Vec<Word>,
     /// Sorted by start; an insertion has an empty range. What stands in the place of each lies in `patches`.
     edits: Vec<(Range<usize>, Range<usize>)>,
-    patches: String,
+    patches: Vec<u8>,
 }
 
 impl Block {
@@ -35,7 +35,7 @@ impl Block {
 
     pub(crate) fn of_file(file: Arc<Path>, line: usize, bytes: Vec<u8>, dialect: Dialect) -> Block {
         let (tokens, words) = Cutter::cut(&bytes, dialect, (Vec::new(), Vec::new()));
-        Block { file, line, bytes, tokens, words, edits: Vec::new(), patches: String::new() }
+        Block { file, line, bytes, tokens, words, edits: Vec::new(), patches: Vec::new() }
     }
 
     /// Another line of the same file in the memory of this block.
@@ -145,20 +145,20 @@ impl Block {
         }
         let start = found.value_span.start;
         self.check_number(start, text)?;
-        self.put(word, text);
+        self.put(word, text.as_bytes());
         Ok(())
     }
 
     /// As [`Block::replace`], by what was read as a plain number already; of a word that has a plain number.
-    pub(crate) fn replace_number(&mut self, word: usize, text: &str) -> Result<()> {
+    pub(crate) fn replace_number(&mut self, word: usize, text: &[u8]) -> Result<()> {
         match self.word(word)?.value {
             Value::Number(_) => self.put(word, text),
-            Value::Expression => self.replace(word, text)?,
+            Value::Expression => self.replace(word, &String::from_utf8_lossy(text))?,
         }
         Ok(())
     }
 
-    fn put(&mut self, word: usize, text: &str) {
+    fn put(&mut self, word: usize, text: &[u8]) {
         let span = self.words[word].value_span.clone();
         self.edits.retain(|(range, _)| *range != span);
         self.edit(span, &[text]);
@@ -175,7 +175,7 @@ impl Block {
         let end = self.word(after)?.span.end;
         let equals = self.check_word(end, address, number)?;
         let blank = self.separator(after);
-        self.edit(end..end, &[blank, address, equals, number]);
+        self.edit(end..end, &[blank, address, equals, number].map(str::as_bytes));
         Ok(())
     }
 
@@ -187,7 +187,7 @@ impl Block {
         let start = self.word(before)?.span.start;
         let equals = self.check_word(start, address, number)?;
         let blank = self.separator(before);
-        self.edit(start..start, &[address, equals, number, blank]);
+        self.edit(start..start, &[address, equals, number, blank].map(str::as_bytes));
         Ok(())
     }
 
@@ -247,7 +247,7 @@ impl Block {
         let mut at = 0;
         for (range, text) in &self.edits {
             out.write_all(&self.bytes[at..range.start])?;
-            out.write_all(&self.patches.as_bytes()[text.clone()])?;
+            out.write_all(&self.patches[text.clone()])?;
             at = range.end;
         }
         out.write_all(&self.bytes[at..])
@@ -281,18 +281,24 @@ impl Block {
         }
     }
 
-    fn edit(&mut self, range: Range<usize>, pieces: &[&str]) {
+    fn edit(&mut self, range: Range<usize>, pieces: &[&[u8]]) {
         if self.patches.is_empty() {
             self.patches.reserve(self.bytes.len() + 16);
         }
         let start = self.patches.len();
-        pieces.iter().for_each(|piece| self.patches.push_str(piece));
+        pieces.iter().for_each(|piece| self.patches.extend_from_slice(piece));
         let text = start..self.patches.len();
         if self.edits.is_empty() {
             self.edits.reserve(self.words.len());
         }
-        let at =
-            self.edits.partition_point(|(other, _)| (other.start, other.end) <= (range.start, range.end));
+        let comes_last =
+            self.edits.last().is_none_or(|(last, _)| last.end <= range.start && last.start < range.start);
+        let at = match comes_last {
+            true => self.edits.len(),
+            false => {
+                self.edits.partition_point(|(other, _)| (other.start, other.end) <= (range.start, range.end))
+            }
+        };
         self.edits.insert(at, (range, text));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::modes::MotionKind;
 use super::unfollowed::Unfollowed;
+use crate::few::Few;
 
 /// A block that moves. Lists are in the order of the addresses given to [`State::new`](super::State::new).
 #[derive(Clone, Debug, PartialEq)]
@@ -11,9 +12,9 @@ pub struct Motion {
     /// How it moves.
     pub kind: MotionKind,
     /// Where it ends, absolute, programmed units, with the axes that the block does not name; `None` where that is not known.
-    pub target: Vec<Option<f64>>,
+    pub target: Few<Option<f64>>,
     /// Which of [`Block::words`](super::Block::words) gave which axis.
-    pub words: Vec<Option<usize>>,
+    pub words: Few<Option<usize>>,
     /// Whether `target` is meant in the machine's own frame (`G53`, `SUPA`) for the axes named.
     pub machine_frame: bool,
 }

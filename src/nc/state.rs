@@ -51,7 +51,7 @@ impl State {
 
     /// The programmed position of each address, programmed units, where it is known.
     pub fn target(&self) -> Vec<Option<f64>> {
-        self.axes.target()
+        self.axes.target().into_vec()
     }
 
     /// Takes one block into account.
@@ -98,7 +98,7 @@ impl State {
     /// none is called behind blocks that move: how it moves, if it does. `None`, and nothing changed, where it takes the long way to tell.
     pub(crate) fn apply_plain(&mut self, block: &Block) -> Option<Option<Motion>> {
         let vocabulary = vocabulary(self.dialect);
-        let (mut words, mut stated) = (vec![None; self.axes.addresses().len()], None);
+        let (mut words, mut stated) = (Few::from_elem(None, self.axes.addresses().len()), None);
         let mut moves = false;
         for (index, word) in block.words().iter().enumerate() {
             if word.address == "F" {
@@ -126,7 +126,7 @@ impl State {
                 self.axes.go(axis, &block.words()[word], &self.modes, line);
             }
         }
-        Some(moves.then(|| Motion { line, kind, target: self.target(), words, machine_frame: false }))
+        Some(moves.then(|| Motion { line, kind, target: self.axes.target(), words, machine_frame: false }))
     }
 
     /// Takes up what a declaration names.
@@ -203,7 +203,7 @@ impl State {
         if by_direction {
             self.axes.lose(line, Why::OtherWords, |a| !is_linear(a));
         }
-        let target = self.target();
+        let target = self.axes.target();
         // What is known of the place behind the block.
         for axis in 0..words.len() {
             if named(axis).is_none() {

@@ -45,14 +45,30 @@ impl Model for Plain {
 }
 
 /// One line after the other.
-fn by_lines(calibrated: &CalibratedMachine, program: &str, setup: &str) -> String {
+fn by_lines(calibrated: &CalibratedMachine, program: &str, setup: &str) -> (String, Report) {
     let setup = Setup::parse("setup.ron", setup).unwrap_or_else(|e| panic!("{e}"));
     let mut model = Plain(calibrated.chain());
     let options = CompensateOptions::default().with_arcs(2e-6);
     let written =
         compensate_with(calibrated.machine(), &mut model, "part.nc", program.as_bytes(), &setup, &options);
-    let (bytes, _) = written.unwrap_or_else(|e| panic!("{e}"));
-    String::from_utf8(bytes).expect("text")
+    let (bytes, report) = written.unwrap_or_else(|e| panic!("{e}"));
+    (String::from_utf8(bytes).expect("text"), report)
+}
+
+/// Moves that are looked at together come to what each of them comes to: largest values to rounding.
+fn is_told_alike(together: &str, apart: &Report) {
+    let together: Report = serde_json::from_str(together).expect("a report");
+    assert_eq!((together.moves, together.corrected_words), (apart.moves, apart.corrected_words));
+    for (a, b) in [
+        (together.largest_left_m, apart.largest_left_m),
+        (together.largest_left_rad, apart.largest_left_rad),
+        (together.largest_correction_m, apart.largest_correction_m),
+        (together.largest_correction_rad, apart.largest_correction_rad),
+        (together.largest_mid_line_m, apart.largest_mid_line_m),
+    ] {
+        // Coordinates of a metre have rounding of 1e-16 m in each of some ten steps.
+        assert!((a.value - b.value).abs() < 1e-14 && a.value > 0.0, "{a:?} {b:?}");
+    }
 }
 
 fn is_alike(calibrated: &CalibratedMachine, program: &str, setup: &str) -> (String, String) {
@@ -117,7 +133,9 @@ fn one_thread_and_many_write_the_same_bytes() {
         assert!(written.lines().count() > count && written.contains("KINCAL"), "{report}");
         let unmarked: String =
             written.split_inclusive('\n').filter(|line| !line.contains("KINCAL")).collect();
-        assert_eq!(unmarked, by_lines(&calibrated, &text, setup));
+        let (alone, told) = by_lines(&calibrated, &text, setup);
+        assert_eq!(unmarked, alone);
+        is_told_alike(&report, &told);
     }
 }
 

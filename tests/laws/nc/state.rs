@@ -22,12 +22,15 @@ fn modal_coordinates_and_motions_are_followed() {
         (motion(1).kind, &motion(1).target[..]),
         (MotionKind::Rapid, &[Some(1.0), Some(2.0), None, None][..])
     );
-    assert_eq!(motion(3).target, [Some(3.0), Some(2.0), Some(-0.5), None]);
-    assert_eq!((motion(3).kind, &motion(3).words), (MotionKind::Linear, &vec![Some(0), None, None, None]));
-    assert_eq!(motion(4).target, [Some(4.0), Some(1.0), Some(-0.5), None]);
-    assert_eq!((motion(7).kind, motion(7).words.clone()), (MotionKind::ArcCcw, vec![None; 4]));
+    assert_eq!(motion(3).target[..], [Some(3.0), Some(2.0), Some(-0.5), None]);
+    assert_eq!(
+        (motion(3).kind, &motion(3).words[..]),
+        (MotionKind::Linear, &[Some(0), None, None, None][..])
+    );
+    assert_eq!(motion(4).target[..], [Some(4.0), Some(1.0), Some(-0.5), None]);
+    assert_eq!((motion(7).kind, &motion(7).words[..]), (MotionKind::ArcCcw, &[None; 4][..]));
     assert_eq!(motion(8).target[1], None);
-    assert_eq!(motion(9).target, [Some(9.0), Some(1.0), Some(-0.5), None]);
+    assert_eq!(motion(9).target[..], [Some(9.0), Some(1.0), Some(-0.5), None]);
     assert_eq!(motion(11).kind, MotionKind::Unstated);
     assert_eq!(state.coordinates()[3], Coordinate::Unprogrammed);
 }
@@ -108,7 +111,7 @@ fn modes_are_followed_in_every_dialect() {
     let kinds: Vec<_> = steps.iter().map(|s| s.motion.as_ref().map(|m| m.kind)).collect();
     use MotionKind::*;
     assert_eq!(kinds, [None, None, Some(Rapid), None, Some(Other), Some(Linear), None, Some(Linear)]);
-    assert_eq!(steps[5].motion.as_ref().expect("moves").target, [Some(4.0), Some(4.0)]);
+    assert_eq!(steps[5].motion.as_ref().expect("moves").target[..], [Some(4.0), Some(4.0)]);
     assert_eq!(
         state.coordinates()[1],
         Coordinate::Lost { line: 7, why: Why::Transformation, last: Some(4.0) }
