@@ -21,7 +21,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
             (
                 "A robot by a tracker, outliers weighed less",
-                "calibrate arm.ron tracker.csv --loss cauchy -o calibrated.ron",
+                "calibrate arm.ron tracker.csv --loss huber -o calibrated.ron",
             ),
         ],
     ),

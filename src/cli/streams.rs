@@ -43,7 +43,7 @@ impl StandardInput {
             own.mut_args(|arg| {
                 if arg.get_id() == "quiet" {
                     arg.default_value_ifs(outputs.iter().map(|id| (id.clone(), DASH, Some("true"))))
-                } else if is_of(arg.get_value_parser(), clap::value_parser!(PathBuf).into()) {
+                } else if is_of(arg.get_value_parser(), clap::value_parser!(PathBuf)) {
                     let input = self.clone();
                     arg.value_parser(PathBufValueParser::new().try_map(move |path| input.named(path)))
                 } else {

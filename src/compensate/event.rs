@@ -10,6 +10,7 @@ pub(super) type Events = SmallVec<[Event; 1]>;
 
 /// One thing that a block makes happen.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "nearly every event is a move")]
 pub(super) enum Event {
     /// Lengths are written in another unit from here on.
     Units,

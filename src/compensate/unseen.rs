@@ -156,8 +156,9 @@ impl WithSimd for Shifts<'_> {
                 let turned = w.cross(axis);
                 v.dot(v).store(&mut parts[0][..S::F64_LANES]);
                 turned.dot(turned).store(&mut parts[1][..S::F64_LANES]);
-                for k in 0..S::F64_LANES.min(self.count - from) {
-                    *sum = (sum.0 + parts[0][k], sum.1 + parts[1][k]);
+                let [shifts, turns] = &parts;
+                for (shift, turn) in shifts.iter().zip(turns).take(S::F64_LANES.min(self.count - from)) {
+                    *sum = (sum.0 + shift, sum.1 + turn);
                 }
             }
         }

@@ -1,12 +1,12 @@
 //! From what the search took in to what is said: which names hold, what is unexplained, and all figures.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::approaches::approaches;
 use super::contained::says_no_more;
 use super::diagnosis::{Diagnosis, Named, SharedEffect, Thinned};
 use super::doubt::{CHANCE, Doubt, doubt, still};
-use super::drives::Drives;
 use super::finding::{Finding, Meaningless};
 use super::folds;
 use super::held_out::Model;
@@ -336,7 +336,7 @@ impl Modelled {
     ) -> Diagnosis {
         let Modelled { mut told, shared_effects, of_shared, parts, of_parts, unexplained, proposals } = self;
         // Figures are of what the file has.
-        let none = Drives::default();
+        let none = DMatrix::zeros(search.rows.residual.len(), 0);
         let rows = search.rows.with(&none);
         let search = &search.rigid(&rows);
         let linear = search.rows.linear;

@@ -3,9 +3,11 @@
 use std::collections::HashMap;
 use std::sync::Mutex;
 
+use nalgebra::DMatrix;
+
 use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
-use super::drives::Drives;
+use super::drives::drives;
 use super::folds;
 use super::lag::{self, lagged};
 use super::linear::{Linear, linear};
@@ -65,10 +67,10 @@ impl Case<'_> {
         let runs = noise::runs(&linear);
         let mut coarse = Coarse::new(&linear, candidates.len());
         let drives_of = |linear: &Linear, coarse: &Coarse| match in_motion {
-            true => Drives::of(linear, coarse, plain, library),
-            false => Drives::default(),
+            true => drives(linear, coarse, plain, library),
+            false => DMatrix::zeros(linear.residual.len(), 0),
         };
-        let mut drives = drives_of(&linear, &coarse);
+        let mut give_way = drives_of(&linear, &coarse);
         let mut out = noise::outliers(&linear, &runs, facts_are_smooth(facts));
         if facts_are_smooth(facts) {
             noise::spare_reversals(&linear, &mut out);
@@ -84,7 +86,7 @@ impl Case<'_> {
         loop {
             let rows = Rows::new(
                 &linear,
-                &drives,
+                &give_way,
                 &coarse,
                 Whitener::new(linear.residual.len(), &runs, &noise, out.clone()),
             );
@@ -135,7 +137,7 @@ impl Case<'_> {
                 let moved =
                     relinearised::straightened(&search, &in_model, machine, recordings, &facts.dead_bands)?;
                 if let Some(moved) = moved {
-                    drives = drives_of(&moved, &coarse);
+                    give_way = drives_of(&moved, &coarse);
                     (linear, noise, moves) = (moved, judged, moves + 1);
                     continue;
                 }

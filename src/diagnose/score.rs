@@ -7,7 +7,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cells::CellSums;
 use super::coarse::Coarse;
-use super::drives::Drives;
 use super::equations::{
     BATCH, Best, Column, Key, ROOM, ROOM_BEYOND, Score, best, judge, key, lengths, unit_size,
 };
@@ -23,7 +22,8 @@ use crate::variation::Slot;
 /// Rows of the recordings and what turns them white.
 pub(super) struct Rows<'a> {
     pub linear: &'a Linear,
-    drives: &'a Drives,
+    /// How drives give way, columns as they are.
+    drives: &'a DMatrix<f64>,
     pub whitener: Whitener,
     /// Whitened residuals of the constant model.
     pub residual: DVector<f64>,
@@ -58,8 +58,16 @@ pub(super) struct Wave {
     pub(super) factors: Vec<f64>,
 }
 
+/// Columns behind others of the same rows.
+pub(super) fn joined(first: DMatrix<f64>, second: &DMatrix<f64>) -> DMatrix<f64> {
+    let at = first.ncols();
+    let mut all = first.insert_columns(at, second.ncols(), 0.0);
+    all.columns_mut(at, second.ncols()).copy_from(second);
+    all
+}
+
 impl<'a> Rows<'a> {
-    pub fn new(linear: &'a Linear, drives: &'a Drives, coarse: &'a Coarse, whitener: Whitener) -> Self {
+    pub fn new(linear: &'a Linear, drives: &'a DMatrix<f64>, coarse: &'a Coarse, whitener: Whitener) -> Self {
         let mut residual = DVector::zeros(linear.residual.len());
         whitener.apply(&linear.residual, residual.as_mut_slice());
         Rows {
@@ -87,7 +95,7 @@ impl<'a> Rows<'a> {
 
     /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way.
     pub fn always(&self) -> DMatrix<f64> {
-        self.drives.behind(&self.linear.constant)
+        joined(self.linear.constant.clone(), self.drives)
     }
 
     /// The same, marginalised.
@@ -98,12 +106,12 @@ impl<'a> Rows<'a> {
     }
 
     /// The same rows where only what is asked for gives way.
-    pub fn with(&self, drives: &'a Drives) -> Rows<'a> {
+    pub fn with(&self, drives: &'a DMatrix<f64>) -> Rows<'a> {
         Rows::new(self.linear, drives, self.coarse, self.whitener.clone())
     }
 
     /// How drives give way.
-    pub fn drives(&self) -> &'a Drives {
+    pub fn drives(&self) -> &'a DMatrix<f64> {
         self.drives
     }
 

@@ -3,8 +3,9 @@
 
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
+
 use super::diagnosis::Named;
-use super::drives::Drives;
 use super::held_out::Model;
 use super::search::Search;
 use super::set_ups;
@@ -35,7 +36,7 @@ pub(super) fn effects(search: &Search, library: &Library, kept: &[ModelTerm]) ->
     let search = match left.is_empty() {
         true => search,
         false => {
-            none = Drives::default();
+            none = DMatrix::zeros(search.rows.residual.len(), 0);
             rows = search.rows.with(&none);
             &search.rigid(&rows)
         }
