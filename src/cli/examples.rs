@@ -129,7 +129,9 @@ pub(super) fn shown(command: Command) -> Command {
         let lines: Vec<String> =
             calls.iter().map(|(what, call)| format!("  {what}:\n    kincal {call}")).collect();
         let title = if calls.len() == 1 { "Example" } else { "Examples" };
-        own.after_help(format!("{title}:\n{}", lines.join("\n")))
+        let before =
+            own.get_after_help().map_or_else(String::new, |text| format!("{}\n\n", text.to_string().trim()));
+        own.after_help(format!("{before}{title}:\n{}", lines.join("\n")))
     })
 }
 

@@ -13,12 +13,7 @@ use crate::cli::files::Output;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-Amounts bear their unit: 100mm, 0.5um, 5deg, 1000mm/min, 0.5m/s^2; points are 0,0,50mm. docs/simulate.md explains every test.
-
-Examples:
-  kincal simulate machines/ac_table_tilting.ron --test BK4 --random 1 --noise 0.5um -o rec.csv
-  kincal simulate machines/xyz_mill.ron --test circle --plane x,y --length 150mm --feed 500mm/min,2000mm/min -o circle.csv
-  kincal simulate machines/ur10.ron --test poses --count 200 --measure pose --noise 0.1mm -o poses.csv")]
+Amounts bear their unit: 100mm, 0.5um, 5deg, 1000mm/min, 0.5m/s^2; points are 0,0,50mm. docs/simulate.md explains every test.")]
 pub(crate) struct Args {
     /// Machine file; one that is calibrated keeps its deviations
     #[arg(value_name = "MACHINE.ron")]
