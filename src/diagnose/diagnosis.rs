@@ -44,7 +44,8 @@ pub struct Diagnosis {
     pub set_ups_left_out: Vec<SetUpLeftOut>,
     /// What was found, strongest evidence first.
     pub findings: Vec<Finding>,
-    /// Joints that have an effect of the findings too, which comes anew with every set-up; the model has them.
+    /// Joints that have an effect without a finding: what is found at another joint and comes anew with every set-up, or what every joint has
+    /// more or less; the model has them.
     #[serde(default, rename = "companions", skip_serializing_if = "Vec::is_empty")]
     pub shared: Vec<SharedEffect>,
     /// Joints that stand still all through a recording, and have an effect that depends on how they came there.
@@ -231,7 +232,7 @@ pub struct LeftOutRms {
     pub placebo: Option<f64>,
 }
 
-/// A joint that has an effect of the findings too, so little that it is no finding; the model has it.
+/// A joint that has an effect, so little that it is no finding; the model has it.
 #[non_exhaustive]
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SharedEffect {
