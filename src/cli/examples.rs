@@ -150,7 +150,9 @@ mod tests {
                     0 => part.split_whitespace().map(String::from).collect(),
                     _ => vec![part.to_string()],
                 });
-                let words = std::iter::once("kincal".to_string()).chain(quoted);
+                // What stands behind `>` is the shell's.
+                let own = quoted.take_while(|word| word != ">");
+                let words = std::iter::once("kincal".to_string()).chain(own);
                 if let Err(error) = all.clone().try_get_matches_from(words) {
                     panic!("{call}: {error}");
                 }
