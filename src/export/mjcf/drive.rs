@@ -260,7 +260,13 @@ impl Drive {
         }
         if let Some((inertia, what)) = &sums.inertia {
             give = inertia + 0.5 * self.delay * self.delay;
-            if give < 0.0 {
+            if self.play > 0.0 && sums.compliance <= 0.0 && sums.friction.is_empty() {
+                let because =
+                    "the joint has play, and the friction that holds its load there would wind this spring";
+                refused.push(Refused { what: what.clone(), because });
+                self.holds.retain(|held| held != what);
+                give = 0.0;
+            } else if give < 0.0 {
                 // More rounding than by a delay: part of it is a low-pass.
                 let low_pass = (-2.0 * give).sqrt();
                 if low_pass <= self.delay {
