@@ -32,15 +32,13 @@ pub(super) fn effects(search: &Search, library: &Library, kept: &[ModelTerm]) ->
     let mut all = kept.to_vec();
     let mut left: Vec<usize> =
         (0..search.candidates.len()).filter(|i| comes_along(*i) && !known(kept, *i)).collect();
-    let (none, rows);
-    let search = match left.is_empty() {
-        true => search,
-        false => {
-            none = DMatrix::zeros(search.rows.residual.len(), 0);
-            rows = search.rows.with(&none);
-            &search.rigid(&rows)
-        }
-    };
+    if left.is_empty() {
+        return Vec::new();
+    }
+    // Against geometry and names alone: what stands anyhow says nothing for itself.
+    let none = DMatrix::zeros(search.rows.residual.len(), 0);
+    let rows = search.rows.with(&none);
+    let search = &search.rigid(&rows);
     while !left.is_empty() {
         let marginal = Arc::new(search.beside(&all, None));
         let field = search.rows.field(marginal.clone());

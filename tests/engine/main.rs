@@ -15,6 +15,7 @@ mod blind;
 mod concealment;
 mod curves;
 mod directions;
+mod drives;
 mod effects_compensated;
 mod error_motions;
 mod instrument_noise;

@@ -16,6 +16,7 @@ const COUNT: usize = 1500;
 fn path(moves: bool) -> Vec<[f64; 3]> {
     let at = |k: usize| {
         let turn = k as f64 / COUNT as f64 * std::f64::consts::TAU;
+        // Of one wave alone the acceleration is its position, and a drive that gives way stands in for what turns with it.
         let x = if moves { 100.0 * (2.0 * turn).sin() + 20.0 * (7.0 * turn).sin() } else { 40.0 };
         [x, 90.0 * (3.0 * turn).cos(), 70.0 * (5.0 * turn + 0.4).sin()]
     };
