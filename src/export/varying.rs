@@ -89,8 +89,10 @@ fn size(
         arrays = arrays.command(name, &path.iter().map(|q| q[c]).collect::<Vec<f64>>());
     }
     let prediction = predict(with, &arrays.recording("travel", machine)?, None)?;
-    Ok(match prediction.left_out.first() {
-        Some(left) => Remainder { what, max_m: None, rms_m: None, because: left.because.clone() },
-        None => Remainder { what, max_m: prediction.max.m, rms_m: prediction.rms.m, because },
-    })
+    // What goes by speed, time or a channel has no size along a path that nobody has run.
+    let (max_m, rms_m) = match prediction.left_out.is_empty() {
+        true => (prediction.max.m, prediction.rms.m),
+        false => (None, None),
+    };
+    Ok(Remainder { what, max_m, rms_m, because })
 }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::plot::{Ink, Layer, Marks, Plot, envelope, thinned};
 use super::table::{Cell, largest, number, percent, residual_unit, table, word, written};
-use super::text::{about, about_unexplained, amount, beside, figures, probability, tests};
+use super::text::{about, about_unexplained, amount, beside, calm, figures, probability, tests};
 use crate::cli::output::Kind;
 use crate::diagnose::{Along, Curve, CurvePoint, Diagnosis, Finding, Size};
 use crate::effects::in_words;
@@ -31,8 +31,9 @@ pub(super) fn found(diagnosis: &Diagnosis) -> Markup {
                 ul.plain { @for line in about(diagnosis, finding) { li { (line) } } }
                 @if let Some(curve) = traces.findings.get(i) { (against(curve, Some(finding), most)) }
             }
-            @for line in beside(diagnosis) { p { (line) } }
         }
+        @for line in beside(diagnosis) { p { (line) } }
+        @if diagnosis.findings.is_empty() && diagnosis.unexplained.is_none() { p { (calm(diagnosis)) } }
         @if let Some(unexplained) = &diagnosis.unexplained {
             h2 { "Unexplained" }
             p { (unexplained.explanation) }
