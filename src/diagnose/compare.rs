@@ -4,7 +4,6 @@ use std::sync::{Arc, PoisonError};
 
 use rayon::prelude::*;
 
-use super::contained::prefer_simpler;
 use super::marginal::Marginal;
 use super::refine::refine;
 use super::search::{LARGE, MANY, Search, VISIBLE};
@@ -99,8 +98,6 @@ impl Search<'_> {
             }
             hypotheses.sort_by(better_first);
         }
-        prefer_simpler(self, &mut hypotheses, close, &field.marginal);
-        hypotheses.sort_by(better_first);
         self.likeliest_name_first(&mut hypotheses);
         hypotheses
     }
