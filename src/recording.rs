@@ -232,8 +232,9 @@ impl Recording {
                 bytes.len() as u64
             }
             Source::File => {
+                // Before it is opened, which a pipe would not bear.
+                let known = std::fs::metadata(&self.path).ok().filter(std::fs::Metadata::is_file)?;
                 let mut file = File::open(&self.path).ok()?;
-                let known = file.metadata().ok().filter(std::fs::Metadata::is_file)?;
                 let mut start = Vec::with_capacity(START);
                 file.by_ref().take(START as u64).read_to_end(&mut start).ok()?;
                 matches!(Form::of_file(&self.path, &start), Ok(None)).then_some(known.len())?

@@ -43,7 +43,7 @@ impl Common {
         if self.quiet || !std::io::stderr().is_terminal() {
             return Progress { bar: None, stage, meter };
         }
-        let begun = Arc::new(Mutex::new(Begun { number: 0, at: Instant::now(), read: 0 }));
+        let begun = Arc::new(Mutex::new(Begun { number: 0, at: Instant::now(), from: 0, read: 0 }));
         let shown = {
             let (meter, stage) = (meter.clone(), stage.clone());
             move |state: &ProgressState, out: &mut dyn Write| {
@@ -93,16 +93,18 @@ impl Drop for Progress {
     }
 }
 
-/// The pass that was seen last, when its first byte was, and how much had been read then.
+/// The pass that was seen last, when it was first seen and how much of it had been read then, and how much at the last look.
 struct Begun {
     number: u64,
     at: Instant,
+    from: u64,
     read: u64,
 }
 
-/// A pass and the seconds since it began.
+/// A pass, and what has been read of it in so many seconds.
 struct UnderWay {
     pass: Pass,
+    lately: u64,
     seconds: f64,
 }
 
@@ -110,23 +112,24 @@ impl Begun {
     /// The pass, if anything of it is being read: of one whose length is not known, if more has been read than at the last look.
     fn under_way(&mut self, pass: Pass) -> Option<UnderWay> {
         if pass.number != self.number || self.read == 0 {
-            (self.number, self.at) = (pass.number, Instant::now());
+            (self.number, self.at, self.from) = (pass.number, Instant::now(), pass.read);
         }
         let is_at_it = match pass.all {
             Some(all) => (1..all).contains(&pass.read),
             None => pass.read > self.read,
         };
         self.read = pass.read;
-        is_at_it.then(|| UnderWay { pass, seconds: self.at.elapsed().as_secs_f64() })
+        let lately = pass.read.saturating_sub(self.from);
+        is_at_it.then(|| UnderWay { pass, lately, seconds: self.at.elapsed().as_secs_f64() })
     }
 }
 
 /// The line of this moment in so many columns; the stage gives way.
 fn line(stage: &str, elapsed: f64, under_way: Option<UnderWay>, room: usize) -> String {
-    let Some(UnderWay { pass: Pass { number, read, all }, seconds }) = under_way else {
+    let Some(UnderWay { pass: Pass { number, read, all }, lately, seconds }) = under_way else {
         return beside(stage, &time(elapsed), room);
     };
-    let rate = (seconds > SOON).then(|| read as f64 / seconds);
+    let rate = (seconds > SOON && lately > 0).then(|| lately as f64 / seconds);
     let mut told = String::new();
     if number > 1 {
         let _ = write!(told, "pass {number}, ");
@@ -194,7 +197,7 @@ mod tests {
     use super::*;
 
     fn under_way(number: u64, read: u64, all: Option<u64>, seconds: f64) -> Option<UnderWay> {
-        Some(UnderWay { pass: Pass { number, read, all }, seconds })
+        Some(UnderWay { pass: Pass { number, read, all }, lately: read, seconds })
     }
 
     #[test]
@@ -224,7 +227,7 @@ mod tests {
 
     #[test]
     fn a_pass_is_under_way_from_its_first_byte_to_its_last() {
-        let mut begun = Begun { number: 0, at: Instant::now(), read: 0 };
+        let mut begun = Begun { number: 0, at: Instant::now(), from: 0, read: 0 };
         let mut is_shown = |number, read, all| begun.under_way(Pass { number, read, all }).is_some();
         assert!(
             !is_shown(0, 0, None)
