@@ -27,11 +27,14 @@ mod output;
 mod part;
 mod predict;
 mod program;
+mod progress;
 mod report;
 mod simulate;
 mod streams;
+mod table;
 mod verdict;
 mod verify;
+mod width;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -136,6 +136,7 @@ pub use verify::{Departure, Verification, VerifyOptions, verify, verify_text};
 use crate::calibration::CalibratedMachine;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
+use crate::meter::Meter;
 pub use crate::nc::Dialect;
 use crate::nc::{Program, State};
 use batches::{How, Make, ends_batch};
@@ -163,10 +164,22 @@ pub fn compensate(
     options: &CompensateOptions,
     out: &mut dyn Write,
 ) -> Result<Report> {
-    let path = path.as_ref();
+    compensate_counted(calibrated, path.as_ref(), setup, options, out, &Meter::default())
+}
+
+/// As [`compensate`]; the bytes that each pass reads of the program are counted.
+pub(crate) fn compensate_counted(
+    calibrated: &CalibratedMachine,
+    path: &Path,
+    setup: &Setup,
+    options: &CompensateOptions,
+    out: &mut dyn Write,
+    meter: &Meter,
+) -> Result<Report> {
     let open = || {
         let file = File::open(path).map_err(|e| Error::file(path, e))?;
-        Program::new(path, BufReader::new(file))
+        meter.begin(file.metadata().ok().filter(std::fs::Metadata::is_file).map(|known| known.len()));
+        Program::new(path, BufReader::new(meter.counting(file)))
     };
     let (mut model, make) = (model_of(calibrated), || model_of(calibrated));
     let models = Models { own: &mut *model, more: more(calibrated, &make) };

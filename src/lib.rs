@@ -27,6 +27,7 @@
 //! | `scalar` | [`Scalar`]: what kinematics is generic over, `f64` and dual numbers |
 //! | [`lie`] | SE(3) and se(3): exp, log, adjoints, Jacobians |
 //! | [`units`] | units at the borders, and what lengths and angles have one of each |
+//! | `meter` | how much of a file a pass has read |
 //! | `residual` | how large residuals are: sums from which RMS, mean and largest follow |
 //! | [`error`] | places in what a user wrote, faults with their mend |
 //! | `foreign` | files of other programs that are no text, by how they begin |
@@ -157,6 +158,7 @@ pub mod inverse;
 pub mod lie;
 pub mod location;
 pub mod machine;
+mod meter;
 pub mod mistakes;
 #[cfg(not(feature = "internals"))]
 mod motion;

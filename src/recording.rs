@@ -65,6 +65,7 @@ use crate::columnar::{Form, Input, Text};
 use crate::error::{Error, Place, Result};
 use crate::foreign::{self, Foreign, START};
 use crate::machine::Machine;
+use crate::meter::Meter;
 use column::Layout;
 use header::Draft;
 use kept::{Keeping, Kept, Stored};
@@ -113,6 +114,8 @@ pub struct Recording {
     /// Number of the header row and the byte behind it.
     data_from: (u64, u64),
     memory: Memory,
+    /// What counts the bytes that passes read, and whether each pass is one of its own there.
+    meter: (Meter, bool),
     /// What the first full pass has brought.
     kept: Arc<OnceLock<Kept>>,
 }
@@ -200,6 +203,7 @@ impl Recording {
             preamble,
             data_from,
             memory: Memory::default(),
+            meter: (Meter::default(), false),
             kept,
         })
     }
@@ -209,6 +213,35 @@ impl Recording {
     pub fn within(mut self, memory: &Memory) -> Recording {
         self.memory = memory.clone();
         self
+    }
+
+    /// The same, with the bytes counted that are read of its rows; `alone`: every pass over it begins one of the meter.
+    #[cfg(feature = "cli")]
+    #[must_use]
+    pub(crate) fn counted_by(mut self, meter: &Meter, alone: bool) -> Recording {
+        self.meter = (meter.clone(), alone);
+        self
+    }
+
+    /// How many bytes its rows take up, where the file says that: not of a pipe, nor of a table in columns, whose text has another length.
+    pub(crate) fn bytes(&self) -> Option<u64> {
+        let all = match &self.source {
+            Source::Bytes(bytes)
+                if matches!(Form::of(&self.path, &bytes[..bytes.len().min(START)]), Ok(None)) =>
+            {
+                bytes.len() as u64
+            }
+            Source::File => {
+                // Before it is opened, which a pipe would not bear.
+                let known = std::fs::metadata(&self.path).ok().filter(std::fs::Metadata::is_file)?;
+                let mut file = File::open(&self.path).ok()?;
+                let mut start = Vec::with_capacity(START);
+                file.by_ref().take(START as u64).read_to_end(&mut start).ok()?;
+                matches!(Form::of_file(&self.path, &start), Ok(None)).then_some(known.len())?
+            }
+            Source::Bytes(_) => return None,
+        };
+        Some(all.saturating_sub(self.data_from.1))
     }
 
     /// What the recording says of itself.

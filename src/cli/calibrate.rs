@@ -18,9 +18,10 @@ use super::Common;
 use super::files::Output;
 use super::keep::Keep;
 use super::output::{
-    Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, table, write_whole,
+    Failure, Kind, Outcome, angle, count, length, open_machine, open_recordings, write_whole,
 };
 use super::report::{self, Frame, Measured, Source, of_measured, write_page};
+use super::table::table;
 use super::verdict;
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -203,8 +204,9 @@ pub(crate) fn judged(
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
-    let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
     let progress = args.common.progress();
+    let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
+    let recordings = progress.reading(recordings);
     let model = args.model(&machine)?;
     let (calibrated, fit, note) =
         judged(&machine, &recordings, (&model, args.options()), args.force, &|text| progress.say(text))?;

@@ -8,7 +8,8 @@ use crate::machine::Machine;
 use serde_json::json;
 
 use super::Common;
-use super::output::{Failure, Outcome, count, open_machine, table};
+use super::output::{Failure, Outcome, count, open_machine};
+use super::table::table;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

@@ -10,7 +10,8 @@ use serde::Serialize;
 use super::Common;
 use super::calibrate::{positive, relative};
 use super::keep::Keep;
-use super::output::{Failure, Outcome, angle, count, length, open_machine, open_recordings, table};
+use super::output::{Failure, Outcome, angle, count, length, open_machine, open_recordings};
+use super::table::table;
 use super::verdict;
 
 #[derive(clap::Args)]

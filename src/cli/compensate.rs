@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::calibration::CalibratedMachine;
 use crate::compensate::{
     CompensateOptions, ExtrapolatedJoint, Listed, Report, Setup, UnknownAxes, UnknownWay, Verification,
-    VerifyOptions, compensate, verify_written,
+    VerifyOptions, compensate_counted, verify_written,
 };
 use crate::inverse::Mode;
 
@@ -120,7 +120,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     let progress = args.common.progress();
     progress.say(&format!("correcting {}", args.program.display()));
     let mut verified = None;
-    let write = |out: &mut dyn std::io::Write| compensate(&calibrated, &args.program, &setup, &options, out);
+    let write = |out: &mut dyn std::io::Write| {
+        compensate_counted(&calibrated, &args.program, &setup, &options, out, progress.meter())
+    };
     let report = match &args.output {
         None => write(&mut std::io::sink())?,
         Some(path) => write_checked(path, write, |written, report| {

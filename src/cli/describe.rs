@@ -15,8 +15,9 @@ use serde_json::{Value, json};
 use super::Common;
 use super::keep::Keep;
 use super::output::{
-    Failure, Kind, Outcome, Shown, angle, count, decimals, length, open_machine, open_recordings, table,
+    Failure, Kind, Outcome, Shown, angle, count, decimals, length, open_machine, open_recordings,
 };
+use super::table::table;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

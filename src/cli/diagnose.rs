@@ -82,7 +82,9 @@ pub(crate) fn judged(
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
+    let progress = args.common.progress();
     let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
+    let recordings = progress.reading(recordings);
     let mut library = Library::standard();
     for path in &args.effects {
         library = library.with_file(path)?;
@@ -94,7 +96,6 @@ pub(crate) fn run(args: &Args) -> Outcome {
             library = library.without(name)?;
         }
     }
-    let progress = args.common.progress();
     let request = DiagnoseOptions { propose: args.propose.is_some(), ..DiagnoseOptions::default() };
     let (diagnosis, model, note) =
         judged(&machine, &recordings, &library, &request, (args.output.is_some(), args.force), &|text| {

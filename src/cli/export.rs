@@ -11,7 +11,8 @@ use crate::units::{Quantity, amount};
 
 use super::Common;
 use super::files::{Destination, Output};
-use super::output::{Outcome, length, open_machine, print, table, write_whole};
+use super::output::{Outcome, length, open_machine, print, write_whole};
+use super::table::table;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

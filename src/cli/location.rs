@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use crate::location::LocationErrors;
 
-use super::output::{Kind, length, table};
+use super::output::{Kind, length};
+use super::table::table;
 
 /// A short table, or the reason why location errors do not apply.
 pub(crate) fn render_location_errors(found: &LocationErrors) -> String {

@@ -3,7 +3,8 @@
 use serde_json::json;
 
 use super::Common;
-use super::output::{Failure, Outcome, print, table};
+use super::output::{Failure, Outcome, print};
+use super::table::table;
 use crate::machine::{Machine, SHIPPED, shipped};
 
 #[derive(clap::Args)]

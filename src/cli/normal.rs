@@ -51,8 +51,9 @@ pub(crate) fn run(args: &Args) -> Outcome {
     }
     let machine = open_machine(&args.machine, |path| Machine::open(path))?;
     let round = args.at.as_ref().map(Round::open).transpose()?;
-    let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
     let progress = args.common.progress();
+    let recordings = args.keep.within(open_recordings(&args.recordings, &machine, &args.machine)?);
+    let recordings = progress.reading(recordings);
     progress.say("summing");
     let part = PartialEquations::of(&machine, &recordings, round.as_ref())?;
     drop(progress);

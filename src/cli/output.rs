@@ -2,13 +2,11 @@
 
 use std::io::{IsTerminal, Read, Write};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use crate::columnar::Form;
 use crate::error::{Error, Place};
 use crate::machine::{Machine, shipped};
 use crate::recording::{Columns, Recording, RecordingFault, open_all};
-use indicatif::ProgressBar;
 
 use super::Common;
 use super::failure::not_written;
@@ -16,6 +14,7 @@ pub(crate) use super::failure::{Failure, Outcome};
 use super::files::{Destination, is_standard};
 use super::part::Part;
 use super::streams::StandardOutput;
+use super::width::for_reading;
 
 /// The message, the line it is about, and the mend; `input` is the file that standard input is in.
 pub(crate) fn complain(failure: &Failure, input: &Path) {
@@ -285,25 +284,6 @@ pub(crate) fn write_recording<T>(
     write_checked(path, in_columns, |_, _| Ok(()))
 }
 
-/// A spinner on standard error while something lasts; gone when it is dropped.
-pub(crate) struct Progress(Option<ProgressBar>);
-
-impl Progress {
-    pub fn say(&self, text: &str) {
-        if let Some(spinner) = &self.0 {
-            spinner.set_message(text.to_string());
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if let Some(spinner) = &self.0 {
-            spinner.finish_and_clear();
-        }
-    }
-}
-
 impl Common {
     /// Writes the machine-readable result where it was asked for.
     pub(crate) fn write_json(&self, value: &impl serde::Serialize) -> Outcome {
@@ -329,18 +309,8 @@ impl Common {
         match self.json {
             Some(Destination::StandardOutput) => Ok(()),
             _ if self.quiet => Ok(()),
-            _ => print(text),
+            _ => print(&for_reading(text)),
         }
-    }
-
-    /// A spinner on standard error if that is a terminal.
-    pub(crate) fn progress(&self) -> Progress {
-        if self.quiet || !std::io::stderr().is_terminal() {
-            return Progress(None);
-        }
-        let spinner = ProgressBar::new_spinner();
-        spinner.enable_steady_tick(Duration::from_millis(120));
-        Progress(Some(spinner))
     }
 }
 
@@ -434,25 +404,4 @@ pub(crate) fn angle(rad: f64) -> String {
 /// Decimals that show so many significant digits.
 pub(crate) fn decimals(x: f64, digits: i32) -> usize {
     (digits - 1 - x.abs().max(1e-9).log10().floor() as i32).clamp(0, 6) as usize
-}
-
-/// Rows as columns of text, each as wide as its widest cell; `right` says which columns stand to the right.
-pub(crate) fn table(indent: &str, right: &[bool], rows: &[Vec<String>]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut text = String::new();
-    for row in rows {
-        let mut line = indent.to_string();
-        for (c, cell) in row.iter().enumerate().filter(|(c, _)| widths[*c] > 0) {
-            let gap = " ".repeat(widths[c] - cell.chars().count());
-            let padded =
-                if right.get(c) == Some(&true) { format!("{gap}{cell}") } else { format!("{cell}{gap}") };
-            line.push_str(if c == 0 { "" } else { "  " });
-            line.push_str(&padded);
-        }
-        text.push_str(line.trim_end());
-        text.push('\n');
-    }
-    text
 }

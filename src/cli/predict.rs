@@ -37,6 +37,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let files: Vec<PathBuf> = std::iter::once(&args.recording).chain(&args.beside).cloned().collect();
+    let progress = args.common.progress();
     let mut calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let recordings = args.keep.within(open_recordings(&files, calibrated.machine(), &args.machine)?);
     if recordings.len() > 1 {
@@ -50,7 +51,7 @@ pub(crate) fn run(args: &Args) -> Outcome {
                     .into(),
         });
     }
-    let progress = args.common.progress();
+    let recordings: Vec<_> = recordings.into_iter().map(|recording| progress.passing(recording)).collect();
     if args.fit_setup {
         progress.say("finding the set-up");
         calibrated = fit_setup(&calibrated, &recordings, Loss::default())?;

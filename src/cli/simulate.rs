@@ -14,7 +14,8 @@ use crate::simulate::{Session, Style, Written};
 use serde_json::json;
 
 use super::files::Files;
-use super::output::{Kind, Outcome, count, length, open_machine, table, write_recording, write_whole};
+use super::output::{Kind, Outcome, count, length, open_machine, write_recording, write_whole};
+use super::table::table;
 pub(crate) use amounts::time;
 pub(crate) use args::Args;
 use args::DropAs;

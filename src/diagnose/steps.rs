@@ -53,7 +53,7 @@ impl Search<'_> {
             if !tried.insert(in_model.iter().map(|effect| effect.candidate).collect()) {
                 break;
             }
-            (self.progress)(&format!("looking for effect {}", in_model.len() + 1));
+            (self.progress)(&format!("looking for effect {} of {} at most", in_model.len() + 1, self.most()));
             let Some(entered) = self.next(&in_model) else { break };
             in_model.push(entered);
             if self.in_motion && from.is_empty() && in_model.len() == 1 && !holds(&in_model) {

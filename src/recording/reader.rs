@@ -140,9 +140,15 @@ pub(super) struct Reading<'a> {
 impl<'a> Reading<'a> {
     pub fn start(recording: &'a Recording, with_text: bool) -> Result<Self> {
         let (lines, offset) = recording.data_from;
+        let (meter, alone) = &recording.meter;
+        if *alone {
+            meter.begin(recording.bytes());
+        }
         Ok(Reading {
             reader: Reader::new(recording, with_text),
-            pieces: Pieces::new(recording.source.read_from(&recording.path, offset)?),
+            pieces: Pieces::new(Box::new(
+                meter.counting(recording.source.read_from(&recording.path, offset)?),
+            )),
             ahead: Vec::new(),
             begun: false,
             stopped: None,
