@@ -15,9 +15,9 @@ const REFINED: usize = 8;
 /// Where effects show their shape, hypotheses with this part of the best one's energy are looked at, so many.
 const SIMILAR: f64 = 0.8;
 const DISCREPANT: usize = 8;
-/// What comes within this part of the best one's energy is a matter of shape.
+/// What comes within this part of the best one's energy is a matter of shape, and a rare name gives way to a common one.
 const UNKNOWN_DISCREPANCY: f64 = 0.002;
-/// There the name is preferred that needs less of a shape of its own: one that owes this part of the energy to it loses the whole slack.
+/// So does one that needs more of a shape of its own: the whole slack is lost by one that owes this part of the energy to it.
 const DEPARTURE: f64 = 0.05;
 
 impl Search<'_> {
@@ -94,7 +94,7 @@ impl Search<'_> {
             for hypothesis in &mut hypotheses[..close] {
                 let departure =
                     ((most - hypothesis.reach / overdispersion) / (DEPARTURE * most)).clamp(0.0, 1.0);
-                hypothesis.weight -= slack * departure;
+                hypothesis.weight += slack * (self.commonness[hypothesis.candidate] - departure);
             }
             hypotheses.sort_by(better_first);
         }

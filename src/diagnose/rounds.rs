@@ -1,6 +1,5 @@
 //! One search from the constant geometry to what is said: rounds of judging the noise, of linearising the machine anew, of names.
 
-use std::collections::HashMap;
 use std::sync::Mutex;
 
 use nalgebra::DMatrix;
@@ -181,14 +180,11 @@ impl Case<'_> {
 /// Families that are met more often than this part of the most frequent one are common.
 const COMMON: f64 = 0.2;
 
-/// How rare the family of each candidate is: the logarithm of how often it is met, 0 for all common ones.
+/// How rare the family of each candidate is at a place where it may be: the logarithm of how often it is met, 0 for all common ones. What has
+/// few places on a machine is not rare at them.
 fn commonness(candidates: &[Candidate]) -> Vec<f64> {
-    let mut met: HashMap<&str, f64> = HashMap::new();
-    for candidate in candidates {
-        *met.entry(&candidate.effect).or_default() += candidate.often;
-    }
-    let most = met.values().copied().fold(f64::MIN_POSITIVE, f64::max);
-    candidates.iter().map(|c| (met[c.effect.as_str()] / (COMMON * most)).min(1.0).ln()).collect()
+    let most = candidates.iter().map(|c| c.often).fold(f64::MIN_POSITIVE, f64::max);
+    candidates.iter().map(|c| (c.often / (COMMON * most)).min(1.0).ln()).collect()
 }
 
 fn facts_are_smooth(facts: &RecordingFacts) -> bool {

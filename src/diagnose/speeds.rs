@@ -58,7 +58,7 @@ fn by_velocity(candidate: &Candidate) -> bool {
 }
 
 fn by_direction(candidate: &Candidate) -> bool {
-    candidate.features.iter().all(Feature::needs_history)
+    candidate.features.iter().all(|f| f.needs_history() && !f.needs_rates())
 }
 
 /// Whether a lag and what goes with direction hang on one joint alone, which has one speed, and do much the same to the readings
