@@ -1,4 +1,4 @@
-//! Wider names that add nothing to what has another name: a scale that is off by 3000 ppm and bends by 10 is a scale error,
+//! Wider names that add nothing to what has another name: a positioning error that is a straight line is a scale error,
 //! `docs/diagnosis-method.md` (78).
 
 use super::search::Search;
