@@ -4,6 +4,7 @@
 //! cargo run --release --features measure --example blind -- --write DIR --kind standard --count 40 --seed 1
 //! cargo run --release --features measure --example blind -- --judge DIR --kind standard
 //! cargo run --release --features measure --example blind -- --report docs/benchmarks.md --count 200 --seed 1
+//! cargo run --release --features measure --example blind -- --ablate docs/benchmarks.md --count 100 --seed 1
 //! ```
 
 #[path = "../tests/blind/mod.rs"]
@@ -15,6 +16,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, ValueEnum};
 
+use harness::ablation::Ablation;
 use harness::baseline::Baseline;
 use harness::case::{Kind, Mode};
 use harness::table;
@@ -32,6 +34,13 @@ struct Arguments {
     /// Draws `--count` cases of each kind, diagnoses them and writes the tables to this file.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Draws `--count` cases of each kind, diagnoses them with every rule of `policy.rs` and again without each that was asked, and writes
+    /// what that does to this file. Takes a `kincal` built with `--features measure`.
+    #[arg(long, value_name = "FILE")]
+    ablate: Option<PathBuf>,
+    /// With `--ablate`: only these rules.
+    #[arg(long, value_name = "NAME")]
+    rule: Vec<String>,
     /// Judges a baseline in place of the engine.
     #[arg(long, value_enum)]
     baseline: Option<Baselines>,
@@ -125,11 +134,14 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         println!("{}", table::terminal(&score, kind));
     }
     if let Some(file) = &arguments.report {
-        let text = between_marks(file, &report(arguments)?)?;
-        std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))?;
+        put(file, ["<!-- blind cases -->", "<!-- end of blind cases -->"], &report(arguments)?)?;
     }
-    if arguments.write.is_none() && arguments.judge.is_none() && arguments.report.is_none() {
-        return Err("nothing to do: give --write DIR, --judge DIR or --report FILE".into());
+    if let Some(file) = &arguments.ablate {
+        put(file, ["<!-- ablation -->", "<!-- end of ablation -->"], &ablation(arguments)?)?;
+    }
+    let files = [&arguments.write, &arguments.judge, &arguments.report, &arguments.ablate];
+    if files.iter().all(|file| file.is_none()) {
+        return Err("nothing to do: give --write DIR, --judge DIR, --report FILE or --ablate FILE".into());
     }
     Ok(())
 }
@@ -153,22 +165,43 @@ fn engine(arguments: &Arguments) -> Result<Engine, String> {
     Ok(engine)
 }
 
-/// Lines between which the tables stand in a file that says more.
-const MARKS: [&str; 2] = ["<!-- blind cases -->", "<!-- end of blind cases -->"];
-
-/// The file with new tables between its marks; at its end where it has none.
-fn between_marks(file: &Path, tables: &str) -> Result<String, String> {
+/// Writes new tables into a file, between two lines that mark where they stand; at its end where it has none.
+fn put(file: &Path, [open, close]: [&str; 2], tables: &str) -> Result<(), String> {
     let old = if file.exists() {
         std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?
     } else {
         String::new()
     };
-    let [open, close] = MARKS;
     let (before, after) = match (old.split_once(open), old.split_once(close)) {
         (Some((before, _)), Some((_, after))) => (before.to_string(), after.to_string()),
         _ => (format!("{old}\n"), "\n".to_string()),
     };
-    Ok(format!("{before}{open}\n\n{tables}\n{close}{after}"))
+    let text = format!("{before}{open}\n\n{tables}\n{close}{after}");
+    std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))
+}
+
+/// Draws both kinds into a folder of its own, and leaves out one rule after the other.
+fn ablation(arguments: &Arguments) -> Result<String, String> {
+    let folder = std::env::temp_dir().join(format!("kincal-blind-ablation-{}", std::process::id()));
+    let (engine, machines) = (engine(arguments)?, machine_folder(arguments));
+    let (count, seed) = (arguments.count, arguments.seed);
+    let mut all = Ablation::default();
+    let mut take = || -> Result<(), String> {
+        for (kind, word) in [(Kind::Standard, "standard"), (Kind::Hard, "hard")] {
+            let own = folder.join(word);
+            harness::write(&own, &harness::machines_in(&machines)?, kind, None, seed, count)?;
+            all.take(&own, &engine, &machines, &arguments.rule)?;
+        }
+        Ok(())
+    };
+    let taken = take();
+    let _ = std::fs::remove_dir_all(&folder);
+    taken?;
+    all.broken.iter().chain(&all.told).for_each(|line| println!("{line}"));
+    Ok(format!(
+        "Written by `cargo run --release --features measure --example blind -- --ablate docs/benchmarks.md --count {count} --seed {seed}`.\n\n{}",
+        all.markdown()
+    ))
 }
 
 /// Draws both kinds into a folder of its own, judges, and renders what came out.

@@ -4,7 +4,6 @@
 //! geometry explains. Every family of the library at every place competes by the evidence for it; what is found is put into the
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
-mod along;
 mod approaches;
 mod blocks;
 mod cell_sums;
@@ -14,12 +13,10 @@ mod compare;
 mod contained;
 mod course;
 mod curves;
-mod detour;
 mod diagnosis;
 mod discrepancy;
 mod doubt;
 mod drives;
-mod elsewhere;
 mod enter;
 mod equations;
 mod evidence;
@@ -45,6 +42,7 @@ mod parts;
 mod passing;
 mod pictures;
 mod placebo;
+mod policy;
 mod polish;
 mod propose;
 mod reach;

@@ -5,6 +5,7 @@ use std::sync::{Arc, PoisonError};
 use rayon::prelude::*;
 
 use super::marginal::Marginal;
+use super::policy::Rule;
 use super::refine::refine;
 use super::search::{LARGE, MANY, Search, VISIBLE};
 use super::terms::{Hypothesis, Mark, ModelTerm};
@@ -81,7 +82,7 @@ impl Search<'_> {
         hypotheses[..close].sort_by(better_first);
         // No play is quite a step: what explains nearly as much may do so better once its shape may depart a little from the family's.
         let most = hypotheses[..close].iter().map(|r| r.reach / overdispersion).fold(0.0, f64::max);
-        if most > LARGE && rows.whitener.count() > MANY {
+        if most > LARGE && rows.whitener.count() > MANY && Rule::MayDepart.decides() {
             let alike: Vec<usize> = (0..close)
                 .filter(|i| hypotheses[*i].reach / overdispersion > SIMILAR * most)
                 .take(DISCREPANT)
@@ -94,7 +95,10 @@ impl Search<'_> {
             for hypothesis in &mut hypotheses[..close] {
                 let departure =
                     ((most - hypothesis.reach / overdispersion) / (DEPARTURE * most)).clamp(0.0, 1.0);
-                hypothesis.weight += slack * (self.commonness[hypothesis.candidate] - departure);
+                let rare =
+                    if Rule::RareGivesWay.decides() { self.commonness[hypothesis.candidate] } else { 0.0 };
+                let departure = if Rule::DepartingGivesWay.decides() { departure } else { 0.0 };
+                hypothesis.weight += slack * (rare - departure);
             }
             hypotheses.sort_by(better_first);
         }
@@ -118,7 +122,7 @@ impl Search<'_> {
         }
         // The earlier of two that are as likely.
         let likeliest = names.into_iter().rev().max_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((i, _)) = likeliest {
+        if let Some((i, _)) = likeliest.filter(|(i, _)| *i > 0 && Rule::FormsTogether.decides()) {
             hypotheses[..=i].rotate_right(1);
         }
     }

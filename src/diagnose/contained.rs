@@ -1,6 +1,7 @@
 //! Wider names that add nothing to what has another name: a positioning error that is a straight line is a scale error,
 //! `docs/diagnosis-method.md` (78).
 
+use super::policy::Rule;
 use super::search::Search;
 use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Candidate;
@@ -42,5 +43,7 @@ pub(super) fn says_no_more(search: &Search, in_model: &[ModelTerm], i: usize) ->
             && hypothesis.weight + (own - takes) / search.overdispersion + RARER > weight
             && !is_empty(other, &hypothesis.score.parameters)
     };
-    is_empty(candidate, &effect.score.parameters) && !hypotheses.iter().any(is_name)
+    is_empty(candidate, &effect.score.parameters)
+        && !hypotheses.iter().any(is_name)
+        && Rule::SaysNoMore.decides()
 }

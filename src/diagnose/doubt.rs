@@ -1,10 +1,8 @@
 //! Why the names that were taken in do not explain what is there, if they do not.
 
-use super::along::along_travel;
-use super::folds;
 use super::marginal::Marginal;
-use super::noise::Noise;
 use super::outbid::outbid;
+use super::policy::Rule;
 use super::search::Search;
 use super::series::Standing;
 use super::shares::Shares;
@@ -15,22 +13,12 @@ use crate::machine::Machine;
 
 /// What is left may be this part of what geometry leaves over before nothing counts as explained.
 const TOLERATED: f64 = 0.2;
-/// What stretches that were left out hold beyond what the others foretell may be this part of all; more where noise that remembers
-/// leaves fewer independent readings.
-const SURPRISE: f64 = 0.003;
-/// Several names that make the mean square of stretches left out so many times that of geometry alone are a patchwork.
-const WORSE: f64 = 2.0;
 /// More events of one moment each in one session are no slips: something is loose, or the instrument jumps to and fro.
 const EVENTS: usize = 2;
 /// Structure counts beyond this many standard deviations of chance.
 pub(super) const CHANCE: f64 = 5.0;
-/// The same for functions of where a joint stands: chance alone does so in one of some hundred recordings of settled positions.
-const ALONG: f64 = 4.5;
 /// Logarithm of the evidence at which a series (69) is structure: there are some hundred of them.
 const STANDING: f64 = 12.0;
-/// Where shapes make up less than this part of all, the names are no patches, whatever surprises.
-const ODD_DISCREPANCY: f64 = 0.05;
-
 /// Structure without a name: where, if that is known, and its energy in units of the noise's variance.
 #[derive(Clone)]
 pub(super) struct Doubt {
@@ -38,13 +26,11 @@ pub(super) struct Doubt {
     /// Another joint whose position it goes with.
     pub with: Option<usize>,
     pub energy: f64,
-    /// The effect that says nearly all of it by itself, if there is one.
-    pub but: Option<usize>,
 }
 
 impl Doubt {
     pub fn of(energy: f64) -> Self {
-        Doubt { place: None, with: None, energy, but: None }
+        Doubt { place: None, with: None, energy }
     }
 
     pub fn at(place: Place, energy: f64) -> Self {
@@ -62,47 +48,32 @@ pub(super) fn doubt(
     in_model: &[ModelTerm],
     machine: &Machine,
     shares: &Shares,
-    noise: &[Noise],
 ) -> Option<Doubt> {
     let (left, total) = (&shares.left, shares.total());
-    let (surprise, deviation) = folds::surprise(search, in_model).unwrap_or((0.0, 1.0));
-    let memory = noise.iter().map(Noise::memory).fold(1.0, f64::max);
-    let patched = search.patched(in_model).or_else(|| search.wandering(in_model));
+    let patched = search.patched(in_model).filter(|_| Rule::Patches.decides());
     // What sounds does so louder and softer, and hardly ever at quite one frequency.
     let wanders = in_model.iter().any(|effect| search.is_tone(effect.candidate));
     let is_unexplained = patched.is_some()
-        || left.beyond > CHANCE && (in_model.is_empty() || left.energy > TOLERATED * total)
-        || left.beyond > CHANCE && search.in_motion && in_model.len() >= search.most()
+        || left.beyond > CHANCE
+            && (in_model.is_empty() || left.energy > TOLERATED * total && Rule::LeavesMuch.decides())
         || in_model.iter().filter(|effect| search.is_event(effect.candidate)).count() > EVENTS
-        || shares.is_discrepant(in_model.len())
-        || search.in_motion && in_model.len() > 1 && folds::worsen(search, in_model, WORSE)
-        || search.in_motion && !wanders && shares.is_unlike()
-        || shares.discrepancies > ODD_DISCREPANCY * total
-            && surprise > CHANCE * left.overdispersion.max(1.0) * deviation
-            && surprise > SURPRISE * memory * total;
+            && Rule::FewEvents.decides()
+        || search.in_motion && !wanders && shares.is_unlike() && Rule::Unlike.decides();
     if is_unexplained {
         let energy = search.leftover(&search.base).energy.max(left.energy);
         return Some(Doubt { place: patched, ..Doubt::of(energy) });
     }
-    if let Some((series, but)) = outbid(search, in_model, machine) {
-        return Some(Doubt { but, ..Doubt::standing(&series) });
+    if let Some(series) = outbid(search, in_model, machine) {
+        return Some(Doubt::standing(&series));
+    }
+    // What is much shows in blocks of samples, what is weak in a series alone.
+    if search.in_motion && !in_model.is_empty() {
+        return None;
     }
     let is_much = |energy: f64| energy > TOLERATED * (total + energy);
-    let beside = search.beside(in_model, None);
-    let series = |beside: Marginal| {
-        standing(search, machine, beside)
-            .filter(|series| series.evidence > STANDING && is_much(2.0 * series.gain))
-            .map(|series| Doubt::standing(&series))
-    };
-    if search.in_motion {
-        // What is much shows in blocks of samples, what is weak in a series alone.
-        return in_model.is_empty().then(|| series(beside)).flatten();
-    }
-    // Settled positions show no course, but they may show a function of where a joint stands, or of something else that is known.
-    let along = along_travel(search, machine, &beside)
-        .filter(|along| along.beyond > ALONG * search.overdispersion && is_much(along.energy))
-        .map(|along| Doubt::at(Place::Joint(along.joint), along.energy));
-    along.or_else(|| series(beside))
+    standing(search, machine, search.beside(in_model, None))
+        .filter(|series| series.evidence > STANDING && is_much(2.0 * series.gain) && Rule::Standing.decides())
+        .map(|series| Doubt::standing(&series))
 }
 
 /// What is still without a name when names were found for a part of it.

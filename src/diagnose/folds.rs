@@ -8,9 +8,10 @@ use super::diagnosis::{Diagnosis, HeldOutRms};
 use super::finding::HeldOutPair;
 use super::marginal::{gram, with_prior};
 use super::noise::Noise;
+use super::policy::Rule;
 use super::rms::rms_of;
 use super::search::Search;
-use super::terms::{ModelTerm, all_but};
+use super::terms::ModelTerm;
 use crate::feature::Samples;
 use crate::units::{ByQuantity, Quantity};
 
@@ -142,43 +143,19 @@ pub(super) fn remaining(
     (all > of_noise).then(|| 1.0 - fall / (all - of_noise))
 }
 
-/// By how much stretches that are left out surprise the model of the others, beyond what its uncertainty there explains:
-/// `Σ_f (e_f - r_f)·r_f - p`, (67), and the standard deviation of that by chance. `None` where there are too few rows.
-pub(super) fn surprise(search: &Search, in_model: &[ModelTerm]) -> Option<(f64, f64)> {
-    let normal = Normal::new(search, in_model)?;
-    let (gram, b) = normal.without(None);
-    let all = Cholesky::new(gram.clone())?;
-    let x = all.solve(&b);
-    let p = b.len() as f64 - all.inverse().trace();
-    let (mut sum, mut variance) = (0.0, 0.0);
-    for (own, toward) in &normal.folds {
-        let part = all.solve(own);
-        variance += 2.0 * part.tr_mul(&part.transpose()).trace();
-        let without = Cholesky::new(&gram - own)?.solve(&(&b - toward));
-        // (e - r)·r = (x - x_without)ᵀ Xᵀ(y - X x)
-        sum += (&x - without).dot(&(toward - own * &x));
-    }
-    Some((sum - p, variance.sqrt()))
-}
-
 /// The effect without which stretches that are left out are foretold best, where that is better than with all, (68): a patch.
 pub(super) fn harmful(search: &Search, in_model: &[ModelTerm]) -> Option<usize> {
     let without = foretold_without(search, in_model)?;
     (0..without.len()).filter(|i| without[*i] > 0.0).max_by(|a, b| without[*a].total_cmp(&without[*b]))
 }
 
-/// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68); none where the others
-/// would have to take it for a shape that right names do not have.
+/// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68).
 fn foretold_without(search: &Search, in_model: &[ModelTerm]) -> Option<Vec<f64>> {
     let normal = Normal::new(search, in_model)?;
     let all = normal.foretold(&|_| true)?;
-    let bends = |i: usize| {
-        let others = all_but(in_model, Some(i));
-        !others.is_empty() && search.shares(&others).is_discrepant(others.len())
-    };
     let without = |i: usize| {
-        let better = normal.foretold(&|other| other != i).map(|without| without - all);
-        better.filter(|better| *better <= 0.0 || !bends(i)).unwrap_or(f64::NEG_INFINITY)
+        let without = normal.foretold(&|other| other != i).map(|without| without - all);
+        without.unwrap_or(f64::NEG_INFINITY)
     };
     Some((0..in_model.len()).map(without).collect())
 }
@@ -285,7 +262,8 @@ pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> 
     let mut kept = in_model.to_vec();
     while let Some(folds) = Folds::new(search, &kept) {
         match folds.worst(search, kept.len()) {
-            Some(worst) => drop(kept.remove(worst)),
+            Some(worst) if Rule::HasToForetell.decides() => drop(kept.remove(worst)),
+            Some(_) => break,
             None => {
                 let (alone, all) = (folds.left_out(search, &|_| false), folds.left_out(search, &|_| true));
                 if is_harm(search, folds.fall(search, &alone, &all)) {
@@ -305,11 +283,6 @@ pub(super) fn worst(search: &Search, in_model: &[ModelTerm], names: usize) -> Op
 
 fn is_harm(search: &Search, (gain, error): (f64, f64)) -> bool {
     if search.in_motion { gain < -error } else { gain < 0.0 }
-}
-
-/// Whether effects make the mean square of stretches that were left out so many times that of geometry alone.
-pub(super) fn worsen(search: &Search, in_model: &[ModelTerm], factor: f64) -> bool {
-    Folds::new(search, in_model).is_some_and(|folds| folds.without_all(search) > factor)
 }
 
 /// Normal equations of all samples and of each fold.
@@ -475,19 +448,6 @@ impl Folds {
             let squares: f64 = rows.iter().map(|row| left[*row].powi(2)).sum();
             (squares / rows.len().max(1) as f64).max(f64::MIN_POSITIVE)
         })
-    }
-
-    /// By which factor it grows with all effects beside geometry.
-    fn without_all(&self, search: &Search) -> f64 {
-        self.energy(search, &|_| true) / self.energy(search, &|_| false)
-    }
-
-    /// Whitened sum of squares of what is left out, with these effects.
-    fn energy(&self, search: &Search, takes: &dyn Fn(usize) -> bool) -> f64 {
-        let left = self.left_out(search, takes);
-        let mut white = vec![0.0; left.len()];
-        search.rows.whitener.apply(&left, &mut white);
-        white.iter().map(|x| x * x).sum()
     }
 
     /// Residuals of every row under the fit of geometry and these effects to the folds that the row is not in, m and rad. What no other fold

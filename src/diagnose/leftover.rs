@@ -29,15 +29,13 @@ pub(super) struct Leftover {
     pub beyond: f64,
     /// Variance of block sums over that of noise, at the length where that is most and there are enough blocks: 1 for noise.
     pub overdispersion: f64,
-    /// Usual power of the loudest band over that of white noise, no less than 1: how far the noise is from what it is taken for.
-    pub band: f64,
 }
 
 /// Measures whitened residuals along runs of rows; rows that are left out are skipped.
 pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Leftover {
     let kept: Vec<Vec<f64>> =
         runs.iter().map(|run| run.iter().filter(|r| !out[**r]).map(|r| residual[*r]).collect()).collect();
-    let mut worst = Leftover { overdispersion: 1.0, band: 1.0, ..Leftover::default() };
+    let mut worst = Leftover { overdispersion: 1.0, ..Leftover::default() };
     for length in LENGTHS {
         let (mut count, mut excess) = (0usize, 0.0);
         for block in kept.iter().flat_map(|run| run.chunks_exact(length)) {
@@ -66,8 +64,7 @@ pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Le
         let overdispersion = squares.iter().sum::<f64>() / count / (1.0 + 2.0 * (2.0 / count).sqrt());
         worst.overdispersion = worst.overdispersion.max(overdispersion);
     }
-    let Some((energy, beyond, band)) = loud(&kept) else { return worst };
-    worst.band = band;
+    let Some((energy, beyond)) = loud(&kept) else { return worst };
     if beyond > CHANCE {
         worst.energy = worst.energy.max(energy);
         worst.beyond = worst.beyond.max(beyond);
@@ -78,9 +75,8 @@ pub(super) fn measure(residual: &[f64], runs: &[Vec<usize>], out: &[bool]) -> Le
 /// Fewer standard deviations than this are chance, for cells.
 const CHANCE: f64 = 5.0;
 
-/// Energy of cells of time and frequency that are louder than noise, by how many standard deviations there are too many of them, and
-/// the usual power of the loudest band.
-fn loud(kept: &[Vec<f64>]) -> Option<(f64, f64, f64)> {
+/// Energy of cells of time and frequency that are louder than noise, and by how many standard deviations there are too many of them.
+fn loud(kept: &[Vec<f64>]) -> Option<(f64, f64)> {
     let half = STRETCH / 2;
     let per_band = half / BANDS;
     let waves: Vec<(Vec<f64>, Vec<f64>)> = (1..=half)
@@ -103,13 +99,12 @@ fn loud(kept: &[Vec<f64>]) -> Option<(f64, f64, f64)> {
     if cells[0].len() < 8 {
         return None;
     }
-    let (mut energy, mut loud, mut loudest) = (0.0, 0usize, 1.0f64);
+    let (mut energy, mut loud) = (0.0, 0usize);
     for powers in &cells {
         let mut sorted = powers.clone();
         sorted.sort_by(f64::total_cmp);
         // The median of χ² with eight degrees of freedom over its mean.
         let usual = sorted[sorted.len() / 2] / 0.918;
-        loudest = loudest.max(usual);
         let usual = usual.clamp(BAND_OFF.0, BAND_OFF.1);
         for power in powers.iter().map(|p| p / usual).filter(|p| *p > LOUD) {
             energy += (power - 1.0) * (2 * per_band) as f64;
@@ -117,5 +112,5 @@ fn loud(kept: &[Vec<f64>]) -> Option<(f64, f64, f64)> {
         }
     }
     let expected = CHANCE_LOUD * count as f64;
-    Some((energy, (loud as f64 - expected) / (expected.max(1.0)).sqrt(), loudest))
+    Some((energy, (loud as f64 - expected) / (expected.max(1.0)).sqrt()))
 }

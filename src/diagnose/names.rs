@@ -16,6 +16,7 @@ use super::marginal::{Marginal, solved};
 use super::nameless::LikelyName;
 use super::odds::LISTED;
 use super::parts::{Unnamed, is_foretold};
+use super::policy::Rule;
 use super::search::Search;
 use super::terms::{Hypothesis, ModelTerm, side_by_side};
 use crate::feature::Dependence;
@@ -123,6 +124,7 @@ impl Unnamed {
             let holds = || is_foretold(search, &all, last) && !says_no_more(search, &all, last);
             is_open &= probability > LIKELY && holds();
             if !is_open {
+                is_open = !Rule::LargestFirst.decides();
                 continue;
             }
             parts = elsewhere;
@@ -199,7 +201,7 @@ impl Unnamed {
             let c = plain.candidate;
             // It departs by a part of its own size: what does next to nothing explains nothing by departing from it.
             let size = (2.0 * plain.score.gain.max(0.0) / energy).sqrt().min(1.0);
-            if 1.0 - size * size > (FARTHEST * size).powi(2) {
+            if 1.0 - size * size > (FARTHEST * size).powi(2) && Rule::FarFromFamily.decides() {
                 continue;
             }
             let Some(term) = search.enter_bare(plain, &ground) else { continue };

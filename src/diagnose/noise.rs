@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 
 use super::linear::{Linear, Span};
+use super::policy::Rule;
 
 /// Noise of one kind of reading: first-order autoregressive, and rounding to the step of its readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,12 +20,6 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// Variance of the mean of many readings over that of as many independent ones.
-    pub fn memory(&self) -> f64 {
-        let rounding = (self.rounding / self.sigma).powi(2);
-        (1.0 - rounding) * (1.0 + self.rho) / (1.0 - self.rho) + rounding
-    }
-
     /// Whether it remembers so long that a misfit may have been taken for it.
     pub fn is_long(&self) -> bool {
         self.rho > LONG
@@ -177,7 +172,7 @@ pub(super) fn spare_reversals(linear: &Linear, out: &mut [bool]) {
         let turns: Vec<_> = turns.collect();
         let is_off = |around: &&std::ops::Range<usize>| off[(*around).clone()].contains(&true);
         let loud: Vec<_> = turns.iter().filter(is_off).collect();
-        if loud.len() >= TWICE && 2 * loud.len() >= turns.len() {
+        if loud.len() >= TWICE && 2 * loud.len() >= turns.len() && Rule::SparesReversals.decides() {
             loud.into_iter().for_each(|around| spared[around.clone()].fill(true));
         }
     }

@@ -1,6 +1,7 @@
 //! How likely a name is among its hypotheses, and which of them are told with it, `docs/diagnosis-method.md` (64).
 
 use super::finding::Confusable;
+use super::policy::Rule;
 use super::search::{Search, VISIBLE};
 use super::terms::Hypothesis;
 use crate::effects::{Family, Place};
@@ -45,7 +46,7 @@ pub(super) fn odds<'a>(
     overdispersion: f64,
     is_plain: bool,
 ) -> Vec<Odds<'a>> {
-    let unsure = if is_plain { 0.0 } else { UNSURE };
+    let unsure = if is_plain || !Rule::OddsMayShift.decides() { 0.0 } else { UNSURE };
     let place = |r: &Hypothesis| search.candidates[r.candidate].place;
     let effect = |r: &Hypothesis| &search.candidates[r.candidate].told_as;
     let plain = |r: &Hypothesis| (r.weight - own.weight).exp();

@@ -1,6 +1,7 @@
 //! Several names that one place without a name outbids: a patchwork, `docs/diagnosis-method.md` (77).
 
 use super::evidence::log_mean_exp;
+use super::policy::Rule;
 use super::search::Search;
 use super::series::Standing;
 use super::terms::ModelTerm;
@@ -10,20 +11,12 @@ use crate::machine::Machine;
 /// By so much, a logarithm, the place has more evidence than all names together.
 const AHEAD: f64 = 5.0;
 
-/// A name at the place says all that is there, but for its shape, if it takes away at least this part of what the series do.
-const SAYS_ALL: f64 = 0.9;
-
-/// The place whose series (69) say more than several names do together, with all the freedom of their shapes; and the name there that
-/// has nearly all of it, if there is one: then the others were pieces of its shape.
+/// The place whose series (69) say more than several names do together, with all the freedom of their shapes.
 ///
 /// Two effects are told apart because neither a place nor a shape takes both. Pieces of which each takes a part of one thing fall behind
 /// a series that takes all of it, though that has ten times their number of coefficients. Settled positions show no course, and several
 /// joints give way there in their own ways.
-pub(super) fn outbid(
-    search: &Search,
-    in_model: &[ModelTerm],
-    machine: &Machine,
-) -> Option<(Standing, Option<usize>)> {
+pub(super) fn outbid(search: &Search, in_model: &[ModelTerm], machine: &Machine) -> Option<Standing> {
     if in_model.len() < 2 || !search.in_motion {
         return None;
     }
@@ -37,10 +30,5 @@ pub(super) fn outbid(
         search.worth(in_model) + rare
     };
     let series = standing(search, machine, search.base.clone())?;
-    let says_all = |i: &usize| {
-        let effect = &in_model[*i..=*i];
-        search.candidates[in_model[*i].candidate].place == series.place
-            && search.shares(effect).names > 2.0 * SAYS_ALL * series.gain
-    };
-    (series.evidence > names + AHEAD).then(|| (series, (0..in_model.len()).find(says_all)))
+    (series.evidence > names + AHEAD && Rule::Outbid.decides()).then_some(series)
 }

@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::discrepancy;
 use super::evidence::log_mean_exp;
+use super::policy::Rule;
 use super::score::Field;
 use super::search::{LARGE, MANY, Search};
 use super::terms::Hypothesis;
@@ -54,6 +55,9 @@ impl Search<'_> {
         }
         let mut order: Vec<usize> = (0..hypotheses.len()).collect();
         order.sort_by(|a, b| ranks[*b].total_cmp(&ranks[*a]));
+        if order.is_sorted() || !Rule::Remembers.decides() {
+            return;
+        }
         *hypotheses = order.into_iter().map(|i| hypotheses[i].clone()).collect();
     }
 
@@ -100,8 +104,10 @@ impl Search<'_> {
         let discrepancy = (1.0 - FOREIGN)
             * with_initial.marginal.worth(&effect.discrepancy, &with_initial.left, self.overdispersion);
         // What owes more to a shape of its own than right names do owes it to something else.
-        let weight = (initial + discrepancy + by_discrepancy)
-            .min(initial + by_initial + OWN * hypothesis.reach / self.overdispersion);
+        let weight = (initial + discrepancy + by_discrepancy).min(match Rule::OwnShapeIsLimited.decides() {
+            true => initial + by_initial + OWN * hypothesis.reach / self.overdispersion,
+            false => f64::INFINITY,
+        });
         log_mean_exp(&[hypothesis.weight, weight])
     }
 }

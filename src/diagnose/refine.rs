@@ -2,6 +2,7 @@
 
 use super::equations::Score;
 use super::marginal::solved;
+use super::policy::Rule;
 use super::score::{Field, Rows};
 use super::terms::Hypothesis;
 use crate::effects::{Candidate, Parameter};
@@ -46,7 +47,8 @@ pub(super) fn refine(
             all.iter().any(|other| candidate.is_half(&other.score.parameters, &r.score.parameters));
         match has_half {
             true if is_overtone_alone(rows, candidate, &r.score, field) => NEVER,
-            true => r.weight - OVERTONE,
+            true if Rule::WaveBeforeOvertone.decides() => r.weight - OVERTONE,
+            true => r.weight,
             false => r.weight,
         }
     };

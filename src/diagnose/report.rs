@@ -19,6 +19,7 @@ use super::outliers;
 use super::parts::{Unnamed, least_foretold};
 use super::pictures::Traces;
 use super::placebo::{Placebo, placebo};
+use super::policy::Rule;
 use super::propose;
 use super::rms::{by_model, rms_of};
 use super::search::Search;
@@ -53,16 +54,7 @@ pub(super) fn report(
     propose: bool,
 ) -> Diagnosis {
     let mut shares = search.shares(in_model);
-    let mut doubt = match doubt(search, in_model, machine, &shares, noise) {
-        Some(Doubt { but: Some(i), .. }) => {
-            return report(search, &in_model[i..=i], (machine, library, facts), noise, propose);
-        }
-        doubt => doubt,
-    };
-    if let Some(said) = without_unsaid(search, in_model, (machine, library), &shares, noise, doubt.is_some())
-    {
-        return report(search, &said, (machine, library, facts), noise, propose);
-    }
+    let mut doubt = doubt(search, in_model, machine, &shares);
     // Where names do not explain all that is there, they stand if they foretell more than what has no name does.
     let proved = doubt.as_ref().and_then(|_| proved(search, in_model, (machine, facts), noise));
     let is_proved = proved.is_some();
@@ -96,15 +88,12 @@ pub(super) fn report(
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
         !empty.contains(&place(i)) && (!search.in_motion || finding.probability > LIKELY)
     };
-    let likely = told.iter().filter(|told| holds(told)).count();
-    if likely < told.len() {
+    if !told.iter().all(holds) {
         let unlikely = told.iter().filter(|told| !holds(told));
         doubt = unlikely
             .max_by(|a, b| in_model[a.0].score.gain.total_cmp(&in_model[b.0].score.gain))
             .map(|(i, ..)| Doubt::at(place(i), 2.0 * in_model[*i].score.gain));
-        // Of a patchwork no piece is a name.
-        let patchwork = told.len() - likely > likely;
-        let both = told.into_iter().zip(placebos).filter(|(told, _)| !patchwork && holds(told));
+        let both = told.into_iter().zip(placebos).filter(|(told, _)| holds(told));
         (told, placebos) = both.unzip();
     }
     // In order of evidence.
@@ -127,39 +116,11 @@ pub(super) fn report(
     // A memory longer than instruments have may be what is to be modelled. Stretches that were left out tell.
     let short: Vec<Noise> = noise.iter().map(Noise::shortened).collect();
     let (shortened, has_parts) = findings.with_parts(search, given, noise, Some(&short), propose);
-    if has_parts && shortened.foretells_more(&plain) { shortened } else { plain }
-}
-
-/// The effects without those that the model has anyhow and that need not be said: what every drive does, where that is not likely to be more
-/// than they all do, or where nothing is in doubt without it. `None` where there is none.
-fn without_unsaid(
-    search: &Search,
-    in_model: &[ModelTerm],
-    (machine, library): (&Machine, &Library),
-    shares: &Shares,
-    noise: &[Noise],
-    is_doubted: bool,
-) -> Option<Vec<ModelTerm>> {
-    let family = |i: &usize| &library.families()[search.candidates[in_model[*i].candidate].family];
-    let of_drives: Vec<usize> = (0..in_model.len()).filter(|i| family(i).of_every_drive).collect();
-    if !search.in_motion || of_drives.is_empty() {
-        return None;
+    if has_parts && shortened.foretells_more(&plain) && Rule::ShorterMemory.decides() {
+        shortened
+    } else {
+        plain
     }
-    let others = |but: &[usize]| -> Vec<ModelTerm> {
-        (0..in_model.len()).filter(|i| !but.contains(i)).map(|i| in_model[i].clone()).collect()
-    };
-    let model = Model::new(search, in_model);
-    let is_likely = |i: &usize| {
-        let told = finding(search, in_model, *i, shares, (machine, library), &model);
-        told.is_some_and(|(finding, _)| finding.probability > LIKELY)
-    };
-    let unlikely: Vec<usize> = of_drives.iter().copied().filter(|i| !is_likely(i)).collect();
-    if !unlikely.is_empty() {
-        return Some(others(&unlikely));
-    }
-    let rest = others(&of_drives);
-    let is_calm = || doubt(search, &rest, machine, &search.shares(&rest), noise).is_none();
-    (is_doubted && is_calm()).then_some(rest)
 }
 
 /// What is said by name, before what has none is asked for.
@@ -265,11 +226,13 @@ impl Findings {
             naming.told.iter().map(|given| &given.term).chain(&naming.parts).cloned().collect();
         let all = [known.as_slice(), &found].concat();
         let has_parts = !modelled.is_empty()
-            && folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF);
+            && (folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF)
+                || !Rule::LeavesHalf.decides());
         // What helped alone may do harm beside them.
         while let Some(i) = has_parts
             .then(|| folds::worst(search, &[known.as_slice(), &found].concat(), told.len()))
             .flatten()
+            .filter(|_| Rule::NoneDoesHarmBesideParts.decides())
         {
             told.remove(i);
             of_search.remove(i);
@@ -425,7 +388,7 @@ fn proved(
     // Parts that are these names and more say nothing against them.
     let is_among = |name: &ModelTerm| parts.iter().any(|part| part.candidate == name.candidate);
     let stand = names.iter().all(is_among) || !folds::are_better(&search, &parts, &names);
-    stand.then_some(names)
+    (stand || !Rule::PartsOutdoNames.decides()).then_some(names)
 }
 
 /// What is said of structure without a name; `found`: the marginal beside what has one.

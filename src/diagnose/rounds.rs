@@ -11,6 +11,7 @@ use super::folds;
 use super::lag::{self, lagged};
 use super::linear::{Linear, linear};
 use super::noise::{self, Noise};
+use super::policy::Rule;
 use super::relinearised;
 use super::report;
 use super::score::Rows;
@@ -115,7 +116,7 @@ impl Case<'_> {
                 let lasting: Vec<ModelTerm> = in_model.iter().filter(lasting).cloned().collect();
                 let off =
                     noise::outliers_again(&out, &linear, &report::residual_of(&search, &lasting), &runs);
-                if !lasting.is_empty() && off != out {
+                if !lasting.is_empty() && off != out && Rule::OutliersAgain.decides() {
                     noise = noise_of(&linear, &report::residual_of(&search, &in_model), &runs, &off, facts);
                     (out, in_model, round) = (off, lasting, round + 1);
                     continue;
@@ -125,14 +126,12 @@ impl Case<'_> {
             let report = |search: &Search, in_model: &[ModelTerm]| -> Said {
                 let diagnosis =
                     report::report(search, in_model, (machine, library, facts), &noise, self.propose);
-                Said { diagnosis, may_be_late: lag::may_be_late(search, in_model) }
+                Said {
+                    diagnosis,
+                    may_be_late: lag::may_be_late(search, in_model).filter(|_| Rule::MayBeLate.decides()),
+                }
             };
             if moves < MOVES && !in_model.is_empty() {
-                if let Some(lagged) = lagged(&search, &in_model, plain) {
-                    (candidates, noise, moves) = (lagged, judged, moves + 1);
-                    coarse = Coarse::new(&linear, candidates.len());
-                    continue;
-                }
                 let moved =
                     relinearised::straightened(&search, &in_model, machine, recordings, &facts.dead_bands)?;
                 if let Some(moved) = moved {
@@ -144,16 +143,15 @@ impl Case<'_> {
             if in_model.is_empty() && !forgot && noise.iter().any(Noise::is_long) {
                 // So long a memory may be a misfit that was taken for noise.
                 let left = search.leftover(&search.base);
-                if left.beyond > BEYOND_NOISE {
+                if left.beyond > BEYOND_NOISE && Rule::ForgetsFirst.decides() {
                     (noise, forgot) = (noise.iter().map(Noise::shortened).collect(), true);
                     continue;
                 }
             }
             if round == NOISE_ROUNDS || is_settled(&judged) {
                 let overdispersion = search.leftover(&search.beside(&in_model, None)).overdispersion;
-                if overdispersion < HOT {
-                    let found = search.unfolded(search.or_without_the_first(in_model));
-                    let found = search.moved_together(less_rare(&search, found));
+                if overdispersion < HOT || !Rule::SearchesAgain.decides() {
+                    let found = less_rare(&search, search.unfolded(in_model));
                     let in_model = search.polished(&folds::useful(&search, &found));
                     return Ok(report(&search, &in_model));
                 }
@@ -161,7 +159,6 @@ impl Case<'_> {
                 let search =
                     Search { overdispersion, known: Mutex::default(), grounds: Mutex::default(), ..search };
                 let found = less_rare(&search, search.unfolded(search.run(&in_model, |_| true)));
-                let found = search.moved_together(found);
                 in_model = search.polished(&folds::useful(&search, &found));
                 if moves < MOVES
                     && let Some(lagged) = lagged(&search, &in_model, plain)

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 
 use super::leftover::{Leftover, measure};
 use super::marginal::Marginal;
+use super::policy::Rule;
 use super::score::Rows;
 use super::terms::{Hypothesis, Mark, ModelTerm, all_but, side_by_side};
 use crate::effects::Candidate;
@@ -81,7 +82,9 @@ impl Search<'_> {
         if let Some(known) = before {
             return known;
         }
-        let is_discrepant = |others: &[ModelTerm]| self.shares(others).is_discrepant(others.len());
+        let is_discrepant = |others: &[ModelTerm]| {
+            self.shares(others).is_discrepant(others.len()) && Rule::BesideNames.decides()
+        };
         let ground = Arc::new(match hidden || !others.is_empty() && is_discrepant(&others) {
             true => self.beside_names(&others),
             false => self.beside(&others, None),

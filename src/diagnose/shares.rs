@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use super::discrepancy;
 use super::leftover::Leftover;
 use super::marginal::Marginal;
+use super::policy::Rule;
 use super::search::Search;
 use super::terms::{Hypothesis, ModelTerm, side_by_side};
 use crate::effects::Place;
@@ -37,11 +38,6 @@ const UNLIKE: f64 = 0.1;
 const CHANCE: f64 = 3.0;
 /// What leaves this part of all beside curves over time jumps.
 const JUMPS: f64 = 0.02;
-
-/// Frequencies nearer than so many turns in the time seen belong to one line.
-const NEAR: f64 = 32.0;
-/// The strongest of them has at least this part of their energy if the line is steady.
-const STEADY: f64 = 0.5;
 
 /// So many functions of where a joint stands may be found at one joint.
 const PATCHES: usize = 2;
@@ -118,27 +114,6 @@ impl Search<'_> {
         self.candidates[candidate].features.iter().any(|f| f.needs_time() && f.wave().is_some())
     }
 
-    /// The place of tones that are so near to one another that they are one, and none of them stands for it: what wanders has no frequency.
-    pub fn wandering(&self, in_model: &[ModelTerm]) -> Option<Place> {
-        let times = || self.rows.linear.samples.iter().filter_map(|s| s.time.as_ref()).flatten();
-        let seen = times().copied().fold(f64::NEG_INFINITY, f64::max)
-            - times().copied().fold(f64::INFINITY, f64::min);
-        let mut tones: Vec<(f64, f64, Place)> = (in_model.iter())
-            .filter_map(|effect| {
-                let candidate = &self.candidates[effect.candidate];
-                let frequency = candidate.frequency(&effect.score.parameters)?;
-                Some((frequency, effect.score.gain, candidate.place))
-            })
-            .collect();
-        tones.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let lines = tones.chunk_by(|a, b| (b.0 - a.0) * seen < NEAR && a.2 == b.2);
-        let wanders = |line: &&[(f64, f64, Place)]| {
-            let strongest = line.iter().map(|tone| tone.1).fold(0.0, f64::max);
-            strongest < STEADY * line.iter().map(|tone| tone.1).sum::<f64>()
-        };
-        lines.into_iter().find(wanders).map(|line| line[0].2)
-    }
-
     /// Whether it happens at one moment of the recordings, or from one sample on.
     pub fn is_event(&self, candidate: usize) -> bool {
         let candidate = &self.candidates[candidate];
@@ -185,7 +160,10 @@ impl Search<'_> {
             2.0 * hypothesis.score.gain > ALL * (shares.discrepancies + shares.left.energy)
         };
         let mut small = in_model.iter().filter(|a| hypothesis.score.gain < REPEATED * a.score.gain);
-        small.any(|a| is_alike(a) || is_of_curve(a) && !(self.in_motion && is_all()))
+        small.any(|a| {
+            is_alike(a) && Rule::Repeats.decides()
+                || is_of_curve(a) && !(self.in_motion && is_all()) && Rule::RepeatsCurve.decides()
+        })
     }
 
     /// Whether it changes with time, whatever the axes do.
@@ -198,7 +176,9 @@ impl Search<'_> {
         let is_course = |a: &ModelTerm| {
             self.goes_by_clock(a.candidate) && hypothesis.score.gain < DISCREPANCY * a.score.gain
         };
-        self.goes_by_clock(hypothesis.candidate) && in_model.iter().any(is_course)
+        self.goes_by_clock(hypothesis.candidate)
+            && in_model.iter().any(is_course)
+            && Rule::OneCourse.decides()
     }
 
     /// Whether an effect is a wave of a whole order, which comes back with every turn, and the hypothesis depends on where the same joint stands
@@ -231,9 +211,9 @@ impl Search<'_> {
         let timed = |candidate: usize| self.goes_by_clock(candidate);
         let share = |effect: &ModelTerm| {
             let is_here = place(effect.candidate) == place(hypothesis.candidate);
-            if is_here && self.is_swell(hypothesis, effect) {
+            if is_here && self.is_swell(hypothesis, effect) && Rule::TrainsSwell.decides() {
                 SWELL
-            } else if self.is_no_discrepancy(hypothesis, effect) {
+            } else if self.is_no_discrepancy(hypothesis, effect) && Rule::OrdersHaveNoShape.decides() {
                 0.0
             } else if is_here {
                 OWN_DISCREPANCY

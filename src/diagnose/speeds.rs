@@ -1,5 +1,6 @@
 //! Whether speeds allow to tell what goes with velocity from what goes with direction.
 
+use super::policy::Rule;
 use super::search::Search;
 use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Candidate;
@@ -14,16 +15,6 @@ const ALIKE: f64 = 0.9;
 /// The other name is taken where it is likelier by this, as a logarithm.
 const LIKELIER: f64 = 2.0;
 
-/// Hypotheses with what speeds do not allow to tell from `own` as likely as it is, but for how often each is met and how rare its size is:
-/// where there is one speed only, a lag and play differ in starts and stops alone, and those hang on shapes that nobody knows.
-pub(super) fn levelled(search: &Search, own: &Hypothesis, hypotheses: Vec<Hypothesis>) -> Vec<Hypothesis> {
-    let level = |r: Hypothesis| match level_with(search, own, &r) {
-        Some(weight) => Hypothesis { weight, ..r },
-        None => r,
-    };
-    hypotheses.into_iter().map(level).collect()
-}
-
 /// Effects of which one speed says no more than of another name, as that other one where its size is less rare: two degrees of play are
 /// a rare thing, a delay of 30 ms is not.
 pub(super) fn less_rare(search: &Search, in_model: Vec<ModelTerm>) -> Vec<ModelTerm> {
@@ -32,7 +23,9 @@ pub(super) fn less_rare(search: &Search, in_model: Vec<ModelTerm>) -> Vec<ModelT
         let hypotheses = search.rivals_of(&in_model, i);
         let Some(own) = hypotheses.iter().find(|r| r.candidate == in_model[i].candidate) else { continue };
         let levelled = hypotheses.iter().filter_map(|r| Some((level_with(search, own, r)?, r)));
-        let best = levelled.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(w, _)| *w > own.weight + LIKELIER);
+        let best = levelled
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(w, _)| *w > own.weight + LIKELIER && Rule::UsualSizeFirst.decides());
         let Some((_, other)) = best else { continue };
         if let Some(entered) = search.settle(other, &search.ground(&in_model, Some(i))) {
             in_model[i] = entered.instead_of(&in_model[i]);

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::folds;
-use super::leftover::Leftover;
 use super::marginal::Marginal;
+use super::policy::Rule;
 use super::search::{ENTER, MANY, Search};
 use super::shares::Shares;
 use super::terms::{Hypothesis, ModelTerm, all_but};
@@ -63,7 +63,9 @@ impl Search<'_> {
                 self.swap(&mut in_model);
             }
             // A name that makes stretches worse that were left out is a patch, unless the next one mends it.
-            let is_patched = self.rows.whitener.count() > MANY && folds::harmful(self, &in_model).is_some();
+            let is_patched = self.rows.whitener.count() > MANY
+                && folds::harmful(self, &in_model).is_some()
+                && Rule::NoneDoesHarm.decides();
             harmful = if is_patched { harmful + 1 } else { 0 };
             match harmful {
                 0 => sound.clone_from(&in_model),
@@ -78,11 +80,11 @@ impl Search<'_> {
     /// The effect to be taken in next: what stands out beside those found, else what was taken for their shape.
     fn next(&self, in_model: &[ModelTerm]) -> Option<ModelTerm> {
         let shares = self.shares(in_model);
-        if shares.is_discrepant(in_model.len()) {
+        if shares.is_discrepant(in_model.len()) && Rule::ShapesFirst.decides() {
             return self.hidden(in_model, &self.hypotheses(in_model), &shares);
         }
         self.beyond(in_model).or_else(|| {
-            let is_odd = shares.discrepancies > ODD * shares.total();
+            let is_odd = shares.discrepancies > ODD * shares.total() && Rule::ShapesLast.decides();
             let ground = || Arc::new(self.beside_names(in_model));
             is_odd.then(|| self.hidden(in_model, &self.compare(ground(), None), &shares)).flatten()
         })
@@ -92,9 +94,11 @@ impl Search<'_> {
     fn beyond(&self, in_model: &[ModelTerm]) -> Option<ModelTerm> {
         let (hypotheses, marginal) = (self.hypotheses(in_model), self.ground(in_model, None));
         let before = self.leftover(&marginal);
-        let best = self.best(&hypotheses, in_model, &before)?;
+        let best = self.best(&hypotheses, in_model)?;
         let least = if self.in_motion { WORTH } else { WORTH_SETTLED } * before.energy;
-        if best.score.gain < self.discrepancy_error(best, in_model) || 2.0 * best.score.gain < least {
+        let is_shape =
+            best.score.gain < self.discrepancy_error(best, in_model) && Rule::LessThanShapes.decides();
+        if is_shape || 2.0 * best.score.gain < least && Rule::TakesLittle.decides() {
             return None;
         }
         self.entered(best, &hypotheses, &marginal)
@@ -108,8 +112,8 @@ impl Search<'_> {
         shares: &Shares,
     ) -> Option<ModelTerm> {
         let marginal = Arc::new(self.beside_names(in_model));
-        let best = self.best(hypotheses, in_model, &self.leftover(&marginal))?;
-        let is_most = 2.0 * best.score.gain >= HIDDEN * shares.discrepancies;
+        let best = self.best(hypotheses, in_model)?;
+        let is_most = 2.0 * best.score.gain >= HIDDEN * shares.discrepancies || !Rule::MostOfShapes.decides();
         let is_own =
             best.score.gain < self.discrepancy_error(best, in_model) || self.is_of_course(best, in_model);
         let entered = (is_most && !is_own).then(|| self.entered(best, hypotheses, &marginal)).flatten();
@@ -117,16 +121,9 @@ impl Search<'_> {
     }
 
     /// The best hypothesis that is neither chance nor what was found already.
-    fn best<'r>(
-        &self,
-        hypotheses: &'r [Hypothesis],
-        in_model: &[ModelTerm],
-        before: &Leftover,
-    ) -> Option<&'r Hypothesis> {
-        let is_chance =
-            |r: &Hypothesis| r.weight <= ENTER * if self.is_tone(r.candidate) { before.band } else { 1.0 };
+    fn best<'r>(&self, hypotheses: &'r [Hypothesis], in_model: &[ModelTerm]) -> Option<&'r Hypothesis> {
         let mut worthy = hypotheses.iter().take_while(|r| r.weight > ENTER);
-        worthy.find(|r| !is_chance(r) && !self.repeats(r, in_model))
+        worthy.find(|r| !self.repeats(r, in_model))
     }
 
     /// A hypothesis taken in, if its evidence stands out from the structure that it leaves.

@@ -6,9 +6,9 @@ use super::held_out::Model;
 use super::names::{GivenName, Naming};
 use super::odds::{Odds, confusable, odds, trust};
 use super::placebo::Placebo;
+use super::policy::Rule;
 use super::search::Search;
 use super::shares::Shares;
-use super::speeds::levelled;
 use super::stretch::wheres;
 use super::terms::{Hypothesis, ModelTerm, all_but};
 use crate::effects::Library;
@@ -61,7 +61,7 @@ pub(super) fn promoted(
 
 /// Whether a meaningless cause does better.
 pub(super) fn is_outdone(placebo: &Option<Placebo>) -> bool {
-    placebo.as_ref().is_some_and(|placebo| placebo.ahead > OUTDONE)
+    placebo.as_ref().is_some_and(|placebo| placebo.ahead > OUTDONE && Rule::Outdone.decides())
 }
 
 /// What is said of effect `i`; nothing where its hypotheses leave too little evidence.
@@ -82,9 +82,6 @@ pub(super) fn finding(
     let own =
         hypotheses.iter().find(|r| r.candidate == effect.candidate).filter(|r| r.weight > TOLD).cloned()?;
     let is_plain = search.commonness[own.candidate] == 0.0 && shares.discrepancies < PLAIN * total;
-    // A shape that is little beside all may be much beside this one.
-    let in_discrepancy = shares.discrepancies < PLAIN * 2.0 * own.score.gain;
-    let hypotheses = if in_discrepancy { hypotheses } else { levelled(search, &own, hypotheses) };
     let odds = odds(search, &hypotheses, &own, left.overdispersion.max(search.overdispersion), is_plain);
     let own_odds =
         odds.iter().find(|o| o.hypothesis.candidate == own.candidate).map_or(0.0, |o| o.probability);

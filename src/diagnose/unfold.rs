@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::discrepancy;
 use super::folds;
+use super::policy::Rule;
 use super::search::{ENTER, Search};
 use super::steps::NEAR;
 use super::terms::{Hypothesis, ModelTerm, all_but};
@@ -67,6 +68,7 @@ impl Search<'_> {
                 && folds::foretell_better(self, &resolved, in_model)
                 && is_useful()
                 && (0..resolved.len()).all(stands_out)
+                && Rule::Unfolds.decides()
             {
                 return Some(resolved);
             }

@@ -221,7 +221,10 @@ mod tests {
         let (rows, _) = noisy();
         let sums: Vec<f64> = rows.chunks(500).map(|part| part.iter().sum::<f64>()).collect();
         let variance = sums.iter().map(|s| s * s).sum::<f64>() / sums.len() as f64 / 500.0;
-        let ratio = variance / (NOISE.sigma.powi(2) * NOISE.memory());
+        // Variance of the mean of many readings over that of as many independent ones.
+        let rounding = (NOISE.rounding / NOISE.sigma).powi(2);
+        let memory = (1.0 - rounding) * (1.0 + NOISE.rho) / (1.0 - NOISE.rho) + rounding;
+        let ratio = variance / (NOISE.sigma.powi(2) * memory);
         assert!((ratio - 1.0).abs() < 3.0 * (2.0 / sums.len() as f64).sqrt(), "{ratio}");
     }
 }

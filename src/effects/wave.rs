@@ -13,12 +13,6 @@ impl Candidate {
         self.parameters.first().filter(|_| is_wave && self.parameters.len() == 1)
     }
 
-    /// How many times it swings in a second, if it is a wave in time.
-    pub(crate) fn frequency(&self, at: &[f64]) -> Option<f64> {
-        let parameter = self.wave().filter(|_| self.features.iter().any(|f| f.needs_time()))?;
-        Some(if parameter.dimension == Dimension::TIME { at[0].recip() } else { at[0] })
-    }
-
     /// Whether a wave's overtone is within its family's range too: what is finer than positions lie apart looks like something coarse.
     pub(crate) fn has_overtones(&self, at: &[f64]) -> bool {
         match self.wave() {

@@ -4,6 +4,7 @@
 //! of machine files; from the engine only what it says of the recordings.
 #![allow(dead_code)]
 
+pub mod ablation;
 pub mod answer;
 pub mod baseline;
 pub mod body;

@@ -41,6 +41,8 @@ pub struct Verdict {
     pub judged: Option<(f64, f64)>,
     pub seconds: f64,
     pub samples: f64,
+    /// Rules that were asked, where that is told.
+    pub asked: Vec<String>,
 }
 
 /// Anything that diagnoses.
@@ -62,6 +64,9 @@ pub struct Engine {
     pub extra: Vec<String>,
     /// Whether the diagnosed model is tried on the judge's path.
     pub judged: bool,
+    /// Rules that are left out, by name; the binary has the feature `measure` where there are any. With none of them in the list it says
+    /// which it would have asked.
+    pub ablated: Option<String>,
 }
 
 impl Engine {
@@ -70,7 +75,7 @@ impl Engine {
         static MADE: AtomicUsize = AtomicUsize::new(0);
         let number = MADE.fetch_add(1, Ordering::Relaxed);
         let scratch = std::env::temp_dir().join(format!("kincal-blind-{}-{number}", std::process::id()));
-        Engine { binary, scratch, extra: Vec::new(), judged: true }
+        Engine { binary, scratch, extra: Vec::new(), judged: true, ablated: None }
     }
 
     /// The same for one case, with families left out and no path to be judged on.
@@ -81,20 +86,36 @@ impl Engine {
             scratch: self.scratch.join(format!("{label}-left-out")),
             extra: self.extra.iter().cloned().chain(left_out).collect(),
             judged: false,
+            ablated: None,
         }
     }
 
-    fn call(&self, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<(), String> {
+    /// The same with a rule left out, or with none, but told which were asked.
+    pub fn ablated(&self, rule: &str) -> Self {
+        Engine {
+            binary: self.binary.clone(),
+            scratch: self.scratch.join(format!("without-{rule}")),
+            extra: self.extra.clone(),
+            judged: self.judged,
+            ablated: Some(rule.to_string()),
+        }
+    }
+
+    /// Calls the binary; returns the rules that it says it asked.
+    fn call(&self, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<Vec<String>, String> {
         let mut command = Command::new(&self.binary);
         arguments.iter().for_each(|a| {
             command.arg(a);
         });
         command.arg("--quiet").env("RAYON_NUM_THREADS", "1");
-        let out = command.output().map_err(|e| format!("{}: {e}", self.binary.display()))?;
-        if out.status.success() {
-            return Ok(());
+        if let Some(rules) = &self.ablated {
+            command.env("KINCAL_ABLATE", rules);
         }
+        let out = command.output().map_err(|e| format!("{}: {e}", self.binary.display()))?;
         let said = String::from_utf8_lossy(&out.stderr);
+        if out.status.success() {
+            return Ok(said.lines().filter_map(|line| line.strip_prefix("rule ")).map(Into::into).collect());
+        }
         Err(said.lines().next().unwrap_or("it failed and said nothing").to_string())
     }
 
@@ -136,10 +157,9 @@ impl Diagnoser for Engine {
         arguments.extend([&"--json" as &dyn AsRef<std::ffi::OsStr>, &json, &"-o", &model]);
         self.extra.iter().for_each(|a| arguments.push(a));
         let started = Instant::now();
-        self.call(&arguments)?;
+        let asked = self.call(&arguments)?;
         let seconds = started.elapsed().as_secs_f64();
-        let mut verdict = Verdict::read(&read_json(&json)?);
-        verdict.seconds = seconds;
+        let mut verdict = Verdict { seconds, asked, ..Verdict::read(&read_json(&json)?) };
         if let (true, Some(judge)) = (self.judged, &case.judge) {
             let plain = own.join("plain.ron");
             let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"calibrate", &case.machine];
@@ -180,6 +200,7 @@ impl Verdict {
             judged: None,
             seconds: 0.0,
             samples: json["samples"].as_f64().unwrap_or(0.0),
+            asked: Vec::new(),
         }
     }
 }

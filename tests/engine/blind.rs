@@ -320,22 +320,18 @@ fn what_goes_with_two_joints_together_is_no_noise_of_settled_positions() {
     assert_eq!(score.odd_at_right_place, Count { hits: 3, of: 3 }, "{:?}", score.failures);
 }
 
-/// Cases of seed 36 where one effect is nearly two others that are there: weight on a tilted axis, an eccentric encoder there and a wobble of
-/// the next axis; a frame that slips and drifts, a guideway that is not straight and a wobble.
-const NEARLY: [(Kind, usize); 2] = [(Kind::Standard, 94), (Kind::Hard, 9)];
+/// A case of seed 36 where one effect is nearly two others that are there: a frame that slips and drifts, a guideway that is not straight
+/// and a wobble.
+const NEARLY: (Kind, usize) = (Kind::Hard, 9);
 
 #[test]
-#[ignore = "long: the engine on two blind cases of two effects"]
+#[ignore = "long: the engine on a blind case of two effects"]
 fn one_effect_that_is_nearly_two_does_not_hide_them() {
     let folder = folder("nearly");
-    let machines = harness::machines();
-    let write = |(number, (kind, of)): (usize, &(Kind, usize))| {
-        let mut case = draw(&machines, *kind, None, 36, *of);
-        assert_eq!(case.mode, Mode::Two);
-        case.number = number;
-        case.write(&folder).expect("written")
-    };
-    let answers: Vec<_> = NEARLY.iter().enumerate().map(write).collect();
+    let (kind, of) = NEARLY;
+    let case = Case { number: 0, ..draw(&harness::machines(), kind, None, 36, of) };
+    assert_eq!(case.mode, Mode::Two);
+    let answers = vec![case.write(&folder).expect("written")];
     let score = judged(&folder, &harness::machine_folder(), &answers);
-    assert_eq!((score.two_right, score.f1()), (4, 1.0), "{:?}", score.failures);
+    assert_eq!((score.two_right, score.f1()), (2, 1.0), "{:?}", score.failures);
 }

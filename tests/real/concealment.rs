@@ -2,8 +2,7 @@
 
 use super::concealed::{Concealed, SETS, Set, names};
 
-/// A joint gives way about its axis and across it: two effects, told as one. Both stay at their joint, or move to another together
-/// (`docs/diagnosis-method.md` (80)).
+/// A joint gives way about its axis and across it: two effects, told as one, which stay at their joint.
 #[test]
 #[ignore = "needs the data sets"]
 fn weight_is_told_of_its_own_joint_beside_counts_that_its_encoder_lost() {
