@@ -1,4 +1,4 @@
-//! No drive is rigid: what every joint in motion does a little, beside whatever is found, `docs/diagnosis-method.md` (72a).
+//! No drive is rigid: what every joint in motion does a little, beside whatever is found, `docs/diagnosis-method.md` (67).
 
 use nalgebra::DMatrix;
 

@@ -374,7 +374,7 @@ impl Folds {
         Some(self.fall_where(search, (&without, &with), &|row| counts[self.owner[row]]))
     }
 
-    /// By how much whitened squares of a fold would fall with effect `i` on average, were it what all folds together say, (81a): what the
+    /// By how much whitened squares of a fold would fall with effect `i` on average, were it what all folds together say, (79a): what the
     /// others do not foretell of it, and what the noise that they have makes of the coefficients.
     fn expected_fall(&self, overdispersion: f64, fold: usize, i: usize) -> Option<f64> {
         let width = self.part.len();

@@ -1,4 +1,4 @@
-//! Which family describes what was modelled as a part without a name, `docs/diagnosis-method.md` (82).
+//! Which family describes what was modelled as a part without a name, `docs/diagnosis-method.md` (80).
 //!
 //! Real shapes depart from those of textbooks, and several things act at one place, each driven by a motion of its own: a cable brings
 //! along another axis, and loses motion where its own axis turns round. So the families compete for what the same joints drive at one place,

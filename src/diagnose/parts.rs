@@ -1,4 +1,4 @@
-//! What has no name is modelled all the same: parts of it, each with a place and with what it depends on, `docs/diagnosis-method.md` (81).
+//! What has no name is modelled all the same: parts of it, each with a place and with what it depends on, `docs/diagnosis-method.md` (79).
 //!
 //! Where the names do not explain what is there, free functions of what each place knows compete with the families by their evidence, one
 //! part after the other. A part stays in the model if stretches that were left out are foretold better with it.

@@ -1,4 +1,4 @@
-//! A family for what has no name: the shortest law that foretells as much as the free function in its place, `docs/diagnosis-method.md` (83).
+//! A family for what has no name: the shortest law that foretells as much as the free function in its place, `docs/diagnosis-method.md` (81).
 //!
 //! Terms of the library's own language compete at the place of a part, one after the other, beside everything else that was found. Where a
 //! few of them foretell stretches that were left out as well as the free function does, they are the law; else the function itself is.

@@ -359,7 +359,7 @@ impl Modelled {
 }
 
 /// The effects that foretell stretches that were left out, each beside the others, where all of them together leave no more than half of
-/// the squares there; unless parts in their place foretell these better, by more than one standard error, `docs/diagnosis-method.md` (81).
+/// the squares there; unless parts in their place foretell these better, by more than one standard error, `docs/diagnosis-method.md` (79).
 fn proved(
     search: &Search,
     in_model: &[ModelTerm],
