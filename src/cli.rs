@@ -14,6 +14,7 @@ mod export;
 pub mod face;
 mod failure;
 mod files;
+mod help;
 mod import;
 mod join;
 mod keep;
@@ -122,7 +123,7 @@ pub fn run() -> ExitCode {
 /// The same with these arguments, the name of the program first.
 fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let input = StandardInput::new();
-    let mut known = input.understood(command());
+    let mut known = help::laid_out(input.understood(command()));
     let matches = known.try_get_matches_from_mut(arguments);
     let parsed = matches.and_then(|matches| {
         let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut known))?;
@@ -131,7 +132,7 @@ fn run_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     });
     let (status, outcome) = match parsed {
         // Help and version are such errors too, with status 0.
-        Err(error) => (error.exit_code().try_into().unwrap_or(2), printed(error.print())),
+        Err(error) => (error.exit_code().try_into().unwrap_or(2), printed(help::fitted(error).print())),
         Ok((command, files)) => {
             part::tidy_when_interrupted();
             let run = || {

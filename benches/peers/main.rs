@@ -4,7 +4,8 @@
 //! RAYON_NUM_THREADS=1 PEERS_WORKLOADS=folder cargo bench --bench peers
 //! ```
 //!
-//! The folder holds the `.bin` files that the peers' generator writes. Times are of the wall clock, so that the machine should be quiet.
+//! or, with `-- --table`, as a table. The folder holds the `.bin` files that the peers' generator writes. Times are of the wall clock, so
+//! that the machine should be quiet.
 
 mod workload;
 
@@ -15,30 +16,30 @@ use kincal::lie::Vec3;
 use kincal::nalgebra::DMatrix;
 use kincal::recording::Recording;
 
-use workload::{Folder, MACHINE_ORDER, ac_machine, by_column, by_row, largest_difference, result, time};
+use workload::{Folder, MACHINE_ORDER, Results, ac_machine, by_column, by_row, largest_difference, time};
 
 fn main() {
     let Some(folder) = Folder::given() else {
         println!("0 of 5 workloads: PEERS_WORKLOADS names no folder");
         return;
     };
-    let machine = ac_machine();
-    forward_kinematics(&folder, &machine);
-    distance_rows(&folder, &machine);
-    arm_jacobian(&folder);
-    identification(&folder, &machine, "W3", "w3_samples");
-    identification(&folder, &machine, "W4", "w4_samples");
+    let (machine, results) = (ac_machine(), Results::asked());
+    forward_kinematics(&folder, &machine, &results);
+    distance_rows(&folder, &machine, &results);
+    arm_jacobian(&folder, &results);
+    identification(&folder, &machine, ("W3", "w3_samples"), &results);
+    identification(&folder, &machine, ("W4", "w4_samples"), &results);
 }
 
 /// W1: where the tool of the nominal machine is at 100 000 random commands.
-fn forward_kinematics(folder: &Folder, machine: &Machine) {
+fn forward_kinematics(folder: &Folder, machine: &Machine, results: &Results) {
     let chain = folder.chain(machine, "poses_nominal");
     let (joints, reference) = (folder.numbers("w1_joints"), folder.numbers("w1.ref"));
     let q = by_column(&joints, &MACHINE_ORDER);
     let (batch, units) = (Batch::new(&chain), q.nrows());
     let mut poses = DMatrix::zeros(units, 12);
     let seconds = time(21, || batch.w_from_t_into(&q, &mut poses));
-    result("W1", "kincal batch", &seconds, units, largest_difference(&by_row(&poses), &reference), "");
+    results.tell("W1", "batch", &seconds, units, largest_difference(&by_row(&poses), &reference), "");
     let mut found = vec![0.0; reference.len()];
     let seconds = time(21, || {
         for (q, pose) in joints.chunks_exact(5).zip(found.chunks_exact_mut(12)) {
@@ -49,11 +50,11 @@ fn forward_kinematics(folder: &Folder, machine: &Machine) {
             }
         }
     });
-    result("W1", "kincal one at a time", &seconds, units, largest_difference(&found, &reference), "");
+    results.tell("W1", "one at a time", &seconds, units, largest_difference(&found, &reference), "");
 }
 
 /// W2: a distance and its row of 42 at 100 000 samples of a machine with errors.
-fn distance_rows(folder: &Folder, machine: &Machine) {
+fn distance_rows(folder: &Folder, machine: &Machine, results: &Results) {
     let batch = Batch::new(&folder.chain(machine, "poses_general"));
     let (joints, reference) = (folder.numbers("w2_joints"), folder.numbers("w2.ref"));
     let q = by_column(&joints, &MACHINE_ORDER);
@@ -61,7 +62,7 @@ fn distance_rows(folder: &Folder, machine: &Machine) {
     let mut rows = DMatrix::zeros(units, 43);
     let seconds = time(21, || batch.distance_rows_into(&q, origin, origin, &mut rows));
     let check = largest_difference(&folder.rows_of_left_increments("poses_general", &rows), &reference);
-    result("W2", "kincal batch", &seconds, units, check, "rows of increments behind exp(dh); turned untimed");
+    results.tell("W2", "batch", &seconds, units, check, "rows of increments behind exp(dh); turned untimed");
     let few = q.rows(0, 96).into_owned();
     let mut rows = DMatrix::zeros(96, 43);
     let seconds = time(21, || {
@@ -69,11 +70,11 @@ fn distance_rows(folder: &Folder, machine: &Machine) {
             batch.distance_rows_into(&few, origin, origin, &mut rows);
         }
     });
-    result("W2", "kincal batch; L1-resident output", &seconds, units / 96 * 96, f64::NAN, "");
+    results.tell("W2", "batch; L1-resident output", &seconds, units / 96 * 96, f64::NAN, "");
 }
 
 /// W5a: the geometric Jacobian of a six-joint arm at 100 000 random commands.
-fn arm_jacobian(folder: &Folder) {
+fn arm_jacobian(folder: &Folder, results: &Results) {
     let (joints, reference) = (folder.numbers("w5_joints"), folder.numbers("w5.ref"));
     let batch = Batch::new(&folder.arm(&workload::arm_machine()));
     let q = by_column(&joints, &[0, 1, 2, 3, 4, 5]);
@@ -82,11 +83,11 @@ fn arm_jacobian(folder: &Folder) {
     let seconds = time(21, || batch.velocities_into(&q, Vec3([0.0; 3]), &mut velocities));
     // Theirs is row by row, ours command by command.
     let theirs = DMatrix::from_fn(units, 36, |k, i| velocities[(k, 6 * (i % 6) + i / 6)]);
-    result("W5a", "kincal batch", &seconds, units, largest_difference(&by_row(&theirs), &reference), "");
+    results.tell("W5a", "batch", &seconds, units, largest_difference(&by_row(&theirs), &reference), "");
 }
 
 /// W3 and W4: 42 parameters from distances, by ten steps of fixed damping and to the solution.
-fn identification(folder: &Folder, machine: &Machine, name: &str, file: &str) {
+fn identification(folder: &Folder, machine: &Machine, (name, file): (&str, &str), results: &Results) {
     let samples = folder.numbers(file);
     let text = workload::distances(&samples);
     let recordings =
@@ -103,9 +104,9 @@ fn identification(folder: &Folder, machine: &Machine, name: &str, file: &str) {
     // What is not a pass is the same in both.
     let (few, many) = (after(10), after(30));
     let passes: Vec<f64> = few.iter().zip(&many).map(|(few, many)| (many - few) / 20.0).collect();
-    result(name, "kincal pass", &passes, units, f64::NAN, "one pass over the samples");
+    results.tell(name, "pass", &passes, units, f64::NAN, "one pass over the samples");
     let seconds = time(runs, || {
         calibrate(machine, &recordings, options(Solver::default())).expect("a fit");
     });
-    result(name, "kincal to the solution", &seconds, units, f64::NAN, "whole call; tolerances as prior");
+    results.tell(name, "to the solution", &seconds, units, f64::NAN, "whole call; tolerances as prior");
 }

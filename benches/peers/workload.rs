@@ -137,13 +137,41 @@ pub fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// A line of the peers' table.
-pub fn result(workload: &str, name: &str, seconds: &[f64], units: usize, check: f64, note: &str) {
-    let (median, least) = (seconds[seconds.len() / 2], seconds[0]);
-    let ns = 1e9 / units as f64;
-    println!(
-        "RESULT,{workload},{name},{median:.6e},{:.4},{:.4},1.00,{check:.2e},{note}",
-        median * ns,
-        least * ns
-    );
+/// Where results go: lines that join the peers' table, or rows of the table in `docs/performance.md`.
+pub struct Results {
+    as_table: bool,
+}
+
+impl Results {
+    /// As `--table` asks.
+    pub fn asked() -> Results {
+        let as_table = std::env::args().any(|argument| argument == "--table");
+        if as_table {
+            println!("| workload | ns a sample, median | the quickest run | from the reference |");
+            println!("| --- | --- | --- | --- |");
+        }
+        Results { as_table }
+    }
+
+    /// One result: `seconds` of all runs in order of length, for so many `units`, `check` away from the reference where there is one.
+    pub fn tell(&self, workload: &str, name: &str, seconds: &[f64], units: usize, check: f64, note: &str) {
+        let (median, least) = (seconds[seconds.len() / 2], seconds[0]);
+        let ns = 1e9 / units as f64;
+        if self.as_table {
+            let check = if check.is_nan() { String::new() } else { format!("{check:.0e}") };
+            println!("| {workload}: {name} | {} | {} | {check} |", three(median * ns), three(least * ns));
+        } else {
+            println!(
+                "RESULT,{workload},kincal {name},{median:.6e},{:.4},{:.4},1.00,{check:.2e},{note}",
+                median * ns,
+                least * ns
+            );
+        }
+    }
+}
+
+/// Three significant digits.
+fn three(value: f64) -> String {
+    let decimals = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
 }

@@ -220,6 +220,10 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
         (Some(text), Some(machine)) => Some(simulate::path(machine, text)?),
         _ => None,
     };
+    let progress = args.common.progress();
+    if let Some(file) = args.files.first() {
+        progress.say(&format!("reading {}", file.display()));
+    }
     let converted = open_parts(&args.files, machine.as_ref(), &args.request(path))?;
     if args.write_map.is_some() && converted.map.is_empty() {
         return Err(Failure::Told {
@@ -245,11 +249,13 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
         Ok(())
     };
     for (path, recording) in paths.iter().zip(&converted.recordings) {
+        progress.say(&format!("writing {}", path.display()));
         write_recording(path, |out| put(out, &recording.text))?;
     }
     if let Some(path) = &args.write_map {
         write_whole(path, |out| put(out, &converted.map))?;
     }
+    drop(progress);
     let mut text = String::new();
     if args.map.is_none() && args.write_map.is_none() && !converted.map.is_empty() {
         text.push_str(&converted.map);

@@ -122,12 +122,20 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ("demo", &[("With the report somewhere else", "demo --report demo.html")]),
 ];
 
+/// What stands before a call.
+const CALL: &str = "    kincal ";
+
+/// Whether a line of help is a call, ready to be pasted.
+pub(super) fn is_call(line: &str) -> bool {
+    line.starts_with(CALL)
+}
+
 /// The same command line with examples behind the help of each command.
 pub(super) fn shown(command: Command) -> Command {
     command.mut_subcommands(|own| {
         let Some((_, calls)) = EXAMPLES.iter().find(|(name, _)| *name == own.get_name()) else { return own };
         let lines: Vec<String> =
-            calls.iter().map(|(what, call)| format!("  {what}:\n    kincal {call}")).collect();
+            calls.iter().map(|(what, call)| format!("  {what}:\n{CALL}{call}")).collect();
         let title = if calls.len() == 1 { "Example" } else { "Examples" };
         let before =
             own.get_after_help().map_or_else(String::new, |text| format!("{}\n\n", text.to_string().trim()));

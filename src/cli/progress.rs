@@ -21,6 +21,8 @@ const SOON: f64 = 0.5;
 const BAR: usize = 16;
 /// What the sign that turns takes up before the line.
 const SIGN: usize = 2;
+/// Characters of a stage that say something of it.
+const LEAST: usize = 10;
 /// Of a terminal that does not say how wide it is.
 const USUAL: usize = 80;
 
@@ -127,7 +129,8 @@ impl Begun {
 /// The line of this moment in so many columns; the stage gives way.
 fn line(stage: &str, elapsed: f64, under_way: Option<UnderWay>, room: usize) -> String {
     let Some(UnderWay { pass: Pass { number, read, all }, lately, seconds }) = under_way else {
-        return beside(stage, &time(elapsed), room);
+        // Before the first stage there is nothing to say.
+        return if stage.is_empty() { String::new() } else { beside(stage, &time(elapsed), room) };
     };
     let rate = (seconds > SOON && lately > 0).then(|| lately as f64 / seconds);
     let mut told = String::new();
@@ -146,7 +149,8 @@ fn line(stage: &str, elapsed: f64, under_way: Option<UnderWay>, room: usize) -> 
                 (100.0 * part).floor()
             );
             if let Some(rate) = rate {
-                let _ = write!(told, ", {}/s, {} left", bytes(rate), time((all - read) as f64 / rate));
+                let _ =
+                    write!(told, ", {}/s, {} left", bytes(rate), time(((all - read) as f64 / rate).ceil()));
             }
         }
         None => {
@@ -160,11 +164,12 @@ fn line(stage: &str, elapsed: f64, under_way: Option<UnderWay>, room: usize) -> 
     beside(stage, &told, room)
 }
 
-/// A stage, cut where it is too long, and what there is to say of it.
+/// A stage, cut where it is too long and left out where little of it would stay, and what there is to say of it.
 fn beside(stage: &str, told: &str, room: usize) -> String {
     let left = room.saturating_sub(len(told) + 2);
     let cut: String = match len(stage) > left {
-        true => stage.chars().take(left.saturating_sub(3)).chain("...".chars()).take(left).collect(),
+        true if left < LEAST => String::new(),
+        true => stage.chars().take(left - 3).chain("...".chars()).collect(),
         false => stage.into(),
     };
     let all = if cut.is_empty() { told.to_string() } else { format!("{cut}  {told}") };
@@ -213,6 +218,16 @@ mod tests {
         assert_eq!(told, "reading a.csv  [====            ] 25 %, 300 MB/s, 3 s left");
         let told = line("correcting p.nc", 3.0, under_way(2, 999, Some(1000), 0.1), 80);
         assert_eq!(told, "correcting p.nc  pass 2, [=============== ] 99 %");
+        let told = line("reading a.csv", 3.0, under_way(1, 900, Some(1000), 1.0), 80);
+        assert!(told.ends_with(", 0.9 kB/s, 1 s left"), "{told}");
+    }
+
+    #[test]
+    fn of_a_stage_enough_is_shown_or_nothing() {
+        let pass = || under_way(1, 300, Some(1000), 0.1);
+        assert_eq!(line("reading big.csv", 3.0, pass(), 35), "reading...  [====            ] 30 %");
+        assert_eq!(line("reading big.csv", 3.0, pass(), 32), "[====            ] 30 %");
+        assert_eq!(line("", 0.1, None, 80), "");
     }
 
     #[test]

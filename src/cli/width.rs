@@ -1,27 +1,43 @@
 //! Text that fits a terminal: how wide it is, where text may break, lines of prose. What is no terminal gets its text as it is.
 
 use std::borrow::Cow;
-use std::io::IsTerminal;
+
+use console::Term;
 
 /// A narrower terminal is taken for as wide as this: numbers with their units have to stand somewhere.
 const NARROWEST: usize = 20;
 /// How much farther in the lines stand that go on with what one line has no room for.
 const HANGING: usize = 2;
 
-/// Columns of the terminal that standard output goes to: what `COLUMNS` says, else the terminal. None where it is no terminal, or one that
-/// does not know.
+/// Columns of the terminal that standard output goes to, as [`width_of`] has them.
 pub(super) fn width() -> Option<usize> {
-    if !std::io::stdout().is_terminal() {
+    width_of(&Term::stdout())
+}
+
+/// Columns of a terminal: what `COLUMNS` says, else the terminal. None where it is no terminal, or one that does not know.
+pub(super) fn width_of(stream: &Term) -> Option<usize> {
+    if !stream.is_term() {
         return None;
     }
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.trim().parse().ok());
-    let own = || console::Term::stdout().size_checked().map(|(_, columns)| usize::from(columns));
+    let own = || stream.size_checked().map(|(_, columns)| usize::from(columns));
     told.filter(|columns| *columns > 0).or_else(own).map(|columns| columns.max(NARROWEST))
 }
 
 /// How many columns a text takes up.
 pub(super) fn len(text: &str) -> usize {
-    text.chars().count()
+    shown(text).count()
+}
+
+/// The characters of a text but what makes letters bold: from an escape to its `m`.
+pub(super) fn shown(text: &str) -> impl Iterator<Item = char> {
+    let mut is_style = false;
+    text.chars().filter(move |c| {
+        is_style |= *c == '\u{1b}';
+        let is_shown = !is_style;
+        is_style &= *c != 'm';
+        is_shown
+    })
 }
 
 /// A text in parts between which a line may end. A number stays with what follows it, its unit, and a sign with its number; so does what
@@ -73,28 +89,37 @@ pub(super) fn for_reading(text: &str) -> Cow<'_, str> {
 
 /// The same for so many columns. A single part that is too long, such as a path, stays whole, to be copied.
 fn within(text: &str, width: usize) -> String {
+    let indent = |line: &str| len(line) - len(line.trim_start());
+    folded(text, width, |line| Some(indent(line) + HANGING))
+}
+
+/// Text of lines no longer than this, as far as their parts allow. `hanging` says at which column a line goes on that is too long, and of
+/// which line nothing is broken.
+pub(super) fn folded(text: &str, width: usize, hanging: impl Fn(&str) -> Option<usize>) -> String {
     let mut fitted = String::with_capacity(text.len() + text.len() / 8);
     for line in text.split_inclusive('\n') {
         let (line, end) = line.strip_suffix('\n').map_or((line, ""), |line| (line, "\n"));
-        if len(line) <= width {
-            fitted.push_str(line);
-        } else {
-            let words = line.trim_start();
-            let indent = len(line) - len(words);
-            fitted.push_str(&line[..line.len() - words.len()]);
-            let mut column = indent;
-            for (i, part) in parts(words).into_iter().enumerate() {
-                if i > 0 && column + 1 + len(part) > width {
-                    let hanging = (indent + HANGING).min(width / 2);
-                    fitted.push('\n');
-                    fitted.extend(std::iter::repeat_n(' ', hanging));
-                    column = hanging;
-                } else if i > 0 {
-                    fitted.push(' ');
-                    column += 1;
+        let words = line.trim_start();
+        let blanks = line.len() - words.len();
+        match hanging(line).filter(|_| len(line) > width) {
+            None => fitted.push_str(line),
+            Some(hanging) => {
+                let hanging = hanging.min(width / 2);
+                fitted.push_str(&line[..blanks]);
+                let mut column = blanks;
+                for (i, part) in parts(words).into_iter().enumerate() {
+                    if i > 0 && column + 1 + len(part) > width {
+                        fitted.truncate(fitted.trim_end_matches(' ').len());
+                        fitted.push('\n');
+                        fitted.extend(std::iter::repeat_n(' ', hanging));
+                        column = hanging;
+                    } else if i > 0 {
+                        fitted.push(' ');
+                        column += 1;
+                    }
+                    fitted.push_str(part);
+                    column += len(part);
                 }
-                fitted.push_str(part);
-                column += len(part);
             }
         }
         fitted.push_str(end);

@@ -260,7 +260,7 @@ impl<'a> Problem<'a> {
                     break 'outer Stop::Steps;
                 }
                 steps += 1;
-                (self.progress)(&format!("step {steps}, objective {objective:.6e}"));
+                (self.progress)(&format!("step {steps}, loss {objective:.3e}"));
                 let step = self.full(&(&eigen.eigenvectors * &amounts), &scales);
                 let mut next = unknowns.stepped(self.layout, &step);
                 let next_normal = self.normal(&next, noise)?;
