@@ -111,11 +111,11 @@ fn ablated(
     only: &[String],
 ) -> Result<Vec<Change>, String> {
     let told = |message: String| format!("{}: {message}", answer.label);
-    let with = engine.ablated("None").diagnose(files).map_err(told)?;
+    let with = engine.ablated("None", &files.label).diagnose(files).map_err(told)?;
     let is_asked = |rule: &&String| only.is_empty() || only.contains(rule);
     let rules: Vec<&String> = with.asked.iter().filter(is_asked).collect();
     let change = |rule: &String| {
-        let without = engine.ablated(rule).diagnose(files).map_err(told)?;
+        let without = engine.ablated(rule, &files.label).diagnose(files).map_err(told)?;
         let error = |verdict: &Verdict| verdict.judged.map_or(1.0, |(_, error)| error);
         let (before, after) = (said(&with), said(&without));
         let error = error(&without) / error(&with);

@@ -90,11 +90,11 @@ impl Engine {
         }
     }
 
-    /// The same with a rule left out, or with none, but told which were asked.
-    pub fn ablated(&self, rule: &str) -> Self {
+    /// The same for one case with a rule left out, or with none, but told which were asked.
+    pub fn ablated(&self, rule: &str, label: &str) -> Self {
         Engine {
             binary: self.binary.clone(),
-            scratch: self.scratch.join(format!("without-{rule}")),
+            scratch: self.scratch.join(format!("{label}-without-{rule}")),
             extra: self.extra.clone(),
             judged: self.judged,
             ablated: Some(rule.to_string()),
@@ -116,7 +116,8 @@ impl Engine {
         if out.status.success() {
             return Ok(said.lines().filter_map(|line| line.strip_prefix("rule ")).map(Into::into).collect());
         }
-        Err(said.lines().next().unwrap_or("it failed and said nothing").to_string())
+        let message = said.lines().find(|line| !line.starts_with("rule "));
+        Err(message.unwrap_or("it failed and said nothing").to_string())
     }
 
     fn predicted(&self, calibrated: &Path, judge: &Path) -> Result<f64, String> {
