@@ -19,6 +19,7 @@ const EVENTS: usize = 2;
 pub(super) const CHANCE: f64 = 5.0;
 /// Logarithm of the evidence at which a series (69) is structure: there are some hundred of them.
 const STANDING: f64 = 12.0;
+
 /// Structure without a name: where, if that is known, and its energy in units of the noise's variance.
 #[derive(Clone)]
 pub(super) struct Doubt {

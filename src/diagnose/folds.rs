@@ -143,21 +143,12 @@ pub(super) fn remaining(
     (all > of_noise).then(|| 1.0 - fall / (all - of_noise))
 }
 
-/// The effect without which stretches that are left out are foretold best, where that is better than with all, (68): a patch.
-pub(super) fn harmful(search: &Search, in_model: &[ModelTerm]) -> Option<usize> {
-    let without = foretold_without(search, in_model)?;
-    (0..without.len()).filter(|i| without[*i] > 0.0).max_by(|a, b| without[*a].total_cmp(&without[*b]))
-}
-
-/// Of each effect, by how much better stretches that are left out are foretold without it, as a logarithm, (68).
-fn foretold_without(search: &Search, in_model: &[ModelTerm]) -> Option<Vec<f64>> {
-    let normal = Normal::new(search, in_model)?;
-    let all = normal.foretold(&|_| true)?;
-    let without = |i: usize| {
-        let without = normal.foretold(&|other| other != i).map(|without| without - all);
-        without.unwrap_or(f64::NEG_INFINITY)
-    };
-    Some((0..in_model.len()).map(without).collect())
+/// Whether stretches that are left out are foretold better without one of these effects, (68): a patch.
+pub(super) fn is_patched(search: &Search, in_model: &[ModelTerm]) -> bool {
+    let Some(normal) = Normal::new(search, in_model) else { return false };
+    let Some(all) = normal.foretold(&|_| true) else { return false };
+    let without = |i: usize| normal.foretold(&|other| other != i);
+    (0..in_model.len()).any(|i| without(i).is_some_and(|without| without > all))
 }
 
 /// Whether stretches that are left out are foretold better by these effects than by others, (68).

@@ -48,8 +48,7 @@ pub(super) fn refine(
         match has_half {
             true if is_overtone_alone(rows, candidate, &r.score, field) => NEVER,
             true if Rule::WaveBeforeOvertone.decides() => r.weight - OVERTONE,
-            true => r.weight,
-            false => r.weight,
+            _ => r.weight,
         }
     };
     all.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))).cloned().unwrap_or(best)

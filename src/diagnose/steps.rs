@@ -64,7 +64,7 @@ impl Search<'_> {
             }
             // A name that makes stretches worse that were left out is a patch, unless the next one mends it.
             let is_patched = self.rows.whitener.count() > MANY
-                && folds::harmful(self, &in_model).is_some()
+                && folds::is_patched(self, &in_model)
                 && Rule::NoneDoesHarm.decides();
             harmful = if is_patched { harmful + 1 } else { 0 };
             match harmful {
