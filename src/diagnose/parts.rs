@@ -65,7 +65,7 @@ impl Unnamed {
         let mut candidates = search.candidates.to_vec();
         let first = candidates.len();
         candidates.extend(library.candidates(machine, facts).all);
-        let coarse = Coarse::new(search.rows.linear, candidates.len());
+        let coarse = Coarse::new(search.rows.linear, &candidates);
         Unnamed { library, candidates, first, coarse }
     }
 

@@ -65,7 +65,7 @@ impl Case<'_> {
         let mut linear = linear(machine, recordings, self.options, &facts.dead_bands, in_motion, progress)?;
         let mut candidates = plain.to_vec();
         let runs = noise::runs(&linear);
-        let mut coarse = Coarse::new(&linear, candidates.len());
+        let mut coarse = Coarse::new(&linear, &candidates);
         let drives_of = |linear: &Linear, coarse: &Coarse| match in_motion {
             true => drives(linear, coarse, plain, library),
             false => DMatrix::zeros(linear.residual.len(), 0),
@@ -164,7 +164,7 @@ impl Case<'_> {
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
                     (candidates, moves) = (lagged, moves + 1);
-                    coarse = Coarse::new(&linear, candidates.len());
+                    coarse = Coarse::new(&linear, &candidates);
                     continue;
                 }
                 return Ok(report(&search, &in_model));
