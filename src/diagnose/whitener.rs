@@ -80,6 +80,13 @@ impl Whitener {
         self.side_by_side([column], [to]);
     }
 
+    /// Sum of squares of a column of rows, whitened.
+    pub fn energy(&self, column: &[f64]) -> f64 {
+        let mut white = vec![0.0; column.len()];
+        self.apply(column, &mut white);
+        white.iter().map(|x| x * x).sum()
+    }
+
     /// Columns of rows, whitened, in place.
     pub fn apply_all(&self, columns: &mut DMatrix<f64>) {
         let rows = columns.nrows().max(1);
