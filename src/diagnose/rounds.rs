@@ -191,7 +191,7 @@ impl Case<'_> {
                 if moves < MOVES
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
-                    (candidates, moves) = (lagged, moves + 1);
+                    (candidates, moves, origin) = (lagged, moves + 1, None);
                     coarse = Coarse::new(&linear, &candidates);
                     continue;
                 }
