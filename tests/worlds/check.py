@@ -4,6 +4,8 @@ The axis goes to and fro, as `waves` do, without noise or geometry. A line that 
 """
 import numpy as np
 
+from bearing import Bearing
+from link import bent
 from machine import Machine
 from paths import EVERY, STEP, eased
 from plant import Bare, Drive, Plant, bodies, gains
@@ -75,4 +77,15 @@ def check(machines):
     q[:, 0] = 0.2 * eased(t / 2)
     off, _ = run(spring=spring, friction=spring * half)
     line("friction at rest: kept after 35 s, share", off[-1] / off[int(2.5 / STEP / EVERY)], 1.0, 0.2)
+    print(f"{'':62} {'Exudyn':>12} {'mechanics':>12}")
+    t = np.arange(0, 20, 0.02)
+    bearing = Bearing(balls=12, pitch=0.08, ball=0.008, preload=1e-5, odd=2e-5, start=0.3)
+    middle, cage = bearing.run(t, 2.0 * np.sin(2 * np.pi * t / 20))
+    line("bearing: turns of the cage in a turn of the ring", np.polyfit(np.sin(2 * np.pi * t / 20) * 2.0, cage, 1)[0], (bearing.pitch - bearing.ball) / (2 * bearing.pitch), 0.01)
+    away = np.angle(np.exp(1j * (np.arctan2(*middle.T[::-1]) - cage - bearing.start)))
+    line("the ring gives way from the odd ball, rad", np.abs(away[25:]).mean(), np.pi, 0.02)
+    none, force = np.zeros((1, 2)), np.array([[0.0, -100.0]])
+    line("link: its end under a force there, m", bent(0.6, 20.0, 1e6, none, force, np.zeros(1))[0, 1], -100 * 0.6**3 / 3e6, 0.01)
+    line("link: the same, turned, rad", bent(0.6, 20.0, 1e6, none, force, np.zeros(1))[0, 2], -100 * 0.6**2 / 2e6, 0.01)
+    line("link: its end under its own weight, m", bent(0.6, 20.0, 1e6, np.array([[0.0, -9.81]]), 0 * force, np.zeros(1))[0, 1], -20 * 9.81 * 0.6**3 / 8e6, 0.02)
     return bad

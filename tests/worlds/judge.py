@@ -19,6 +19,9 @@ RIGHT = {
     "cogging": ["cyclic_error"],
     "delay": ["servo_lag"],
     "no_forward": ["servo_lag"],
+    # What Exudyn moves. A ball that is too large moves the axis across once in a turn of the cage.
+    "odd_ball": ["radial_runout"],
+    "flexible_link": ["gravity_compliance", "payload_compliance"],
 }
 # Every loop gives way a little under acceleration and weight, and follows a little late.
 LOOP = ["inertial_error", "servo_lag", "gravity_compliance"]
@@ -47,7 +50,7 @@ def answered(folder, out):
     for a in json.loads((folder / "answers.json").read_text()):
         head = next((folder / a["case"]).glob("rec_*.csv")).read_text()[:400]
         yield {"file": f"{a['machine']}.ron", "measurement": head.split("# measurement: ")[1].split()[0], "found": out,
-               "physics": [{"kind": KINDS[name], "at": at} for name, at in a["concealed"]], "textbook_um": {"plain": None, "best": None, "column": None}} | a
+               "physics": [{"kind": KINDS.get(name, name), "at": at} for name, at in a["concealed"]], "textbook_um": {"plain": None, "best": None, "column": None}} | a
 
 
 def run(program, folder, machines, answer, again, rivals):

@@ -107,14 +107,14 @@ class Machine:
         """Pose of every frame in the one before it, with its constant deviation."""
         return {f.name: f.pose @ exp(geometry[6 * k:6 * k + 6]) for k, f in enumerate(self.frames)}
 
-    def chain(self, q, geometry):
-        """w_from_t and, for every frame, w from that frame before its joint. `q`: n x joints."""
+    def chain(self, q, geometry, moving={}):
+        """w_from_t and, for every frame, w from that frame before its joint. `q`: n x joints; `moving`: poses (n x 4 x 4) by which frames are moved besides, in themselves."""
         placed, at, n = self.placed(geometry), {}, len(q)
         ends = {}
         for branch, frames in self.branches.items():
             now = np.broadcast_to(np.eye(4), (n, 4, 4))
             for f in frames:
-                now = now @ placed[f.name]
+                now = now @ placed[f.name] @ moving.get(f.name, np.eye(4))
                 at[f.name] = now
                 if f.kind:
                     x, motion = q[:, self.joints.index(f)], np.broadcast_to(np.eye(4), (n, 4, 4)).copy()

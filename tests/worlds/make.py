@@ -261,14 +261,20 @@ def textbook(scene, judge, bare, told, y, z):
 
 
 def make(folder, release, count, only, machines):
-    folder, fleet_ = pathlib.Path(folder), fleet(machines)
+    fleet_ = fleet(machines)
+    cases = ((f"case_{index:03}", index, what) for index, what in enumerate(plan(release, fleet_, count)))
+    keep(folder, release, only, cases, lambda index, what: make_case(release, fleet_, index, *what))
+
+
+def keep(folder, release, only, cases, made_of):
+    """Writes cases as they are made: recordings, the judge's path, what the axes did, and the answers."""
+    folder = pathlib.Path(folder)
     answers = folder / "answers.json"
     known = {a["case"]: a for a in json.loads(answers.read_text())} if only and answers.exists() else {}
-    for index, (sort, which, kind) in enumerate(plan(release, fleet_, count)):
+    for name, index, what in cases:
         if only and index not in only:
             continue
-        start, name = time.time(), f"case_{index:03}"
-        made = make_case(release, fleet_, index, sort, which, kind)
+        start, made = time.time(), made_of(index, what)
         texts = made.pop("texts")
         for sub in (folder / name, folder / "axes" / name, folder / "judge"):
             sub.mkdir(parents=True, exist_ok=True)

@@ -15,6 +15,7 @@ commands = parser.add_subparsers(dest="command", required=True)
 one = commands.add_parser("make", help="make cases")
 one.add_argument("folder")
 one.add_argument("--release", required=True, help="a string whose hash is the seed, such as the name of an upstream release")
+one.add_argument("--by", choices=["mujoco", "exudyn"], default="mujoco", help="the simulator")
 one.add_argument("--count", type=int, default=16)
 one.add_argument("--only", type=lambda s: {int(x) for x in s.split(",")}, default=None, help="numbers of cases, such as 3,7; the others stay as they are")
 two = commands.add_parser("judge", help="run kincal on every case")
@@ -30,7 +31,10 @@ commands.add_parser("check", help="each kind of physics against what mechanics s
 
 given = parser.parse_args()
 if given.command == "make":
-    from make import make
+    if given.by == "mujoco":
+        from make import make
+    else:
+        from emergent import make
     make(given.folder, given.release, given.count, given.only, given.machines)
 elif given.command == "check":
     from check import check
