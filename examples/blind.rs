@@ -53,6 +53,10 @@ struct Arguments {
     /// With `--judge`: diagnoses cases of a single effect with its family left out of the library.
     #[arg(long)]
     left_out: bool,
+    /// With `--judge`: cases of a single effect with its family and all that looks like it left out, and the family that is proposed in
+    /// their place tried on the judge's path; clean ones as they are.
+    #[arg(long, conflicts_with = "left_out")]
+    proposals: bool,
     /// Machines of this folder (*.ron) in place of those shipped.
     #[arg(long, value_name = "DIR")]
     machines: Option<PathBuf>,
@@ -124,6 +128,10 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         let said = harness::left_out::judge(folder, &engine(arguments)?, &machines)?;
         said.broken.iter().chain(&said.told).for_each(|line| println!("{line}"));
         println!("\n{}", table::left_out(&said));
+    } else if let Some(folder) = arguments.judge.as_ref().filter(|_| arguments.proposals) {
+        let said = harness::proposed::judge(folder, &engine(arguments)?, &machines)?;
+        said.broken.iter().chain(&said.told).for_each(|line| println!("{line}"));
+        println!("\n{}", table::proposed(&said));
     } else if let Some(folder) = &arguments.judge {
         let score = match arguments.baseline {
             Some(Baselines::Ranked) => harness::judge(folder, &machines, &Baseline::Ranked)?,

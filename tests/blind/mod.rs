@@ -14,6 +14,7 @@ pub mod folder;
 pub mod left_out;
 pub mod odd;
 pub mod path;
+pub mod proposed;
 pub mod random;
 pub mod score;
 pub mod setting;

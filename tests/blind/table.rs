@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::case::Kind;
 use super::left_out::LeftOut;
+use super::proposed::Proposed;
 use super::score::{Count, Score, median};
 
 fn percent(count: Count) -> String {
@@ -179,6 +180,19 @@ pub fn terminal(score: &Score, kind: Kind) -> String {
 }
 
 /// What is said with the true family left out, in Markdown.
+pub fn proposed(all: &Proposed) -> String {
+    let rows = [
+        ("a family proposed", all.given),
+        ("as good on the judge's path as the family, within 5 %", all.as_good),
+        ("nothing concealed: a family proposed", all.on_clean),
+    ];
+    let mut out = String::from("| one effect, its family and its relatives left out | is |\n| --- | --- |\n");
+    for (figure, count) in rows {
+        let _ = writeln!(out, "| {figure} | {} |", percent(count));
+    }
+    out
+}
+
 pub fn left_out(all: &LeftOut) -> String {
     let rows = [
         ("`unexplained` given", all.unexplained),

@@ -1,11 +1,14 @@
 //! What a diagnosis says of a case, and the engine behind the command line. Neither ever sees an answer.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use serde_json::Value;
+
+use super::proposed::Trial;
 
 /// The files of a case that may be looked at.
 #[derive(Clone, Debug)]
@@ -99,6 +102,44 @@ impl Engine {
             judged: self.judged,
             ablated: Some(rule.to_string()),
         }
+    }
+
+    /// Diagnoses a case with the whole library, without some families, and with what is proposed in their place.
+    ///
+    /// # Errors
+    /// What went wrong, in words.
+    pub fn proposed(&self, left_out: &BTreeSet<String>, case: &CaseFiles) -> Result<Trial, String> {
+        let own = self.scratch.join(format!("{}-proposed", case.label));
+        std::fs::create_dir_all(&own).map_err(|e| format!("{}: {e}", own.display()))?;
+        let judge = case.judge.as_ref().ok_or("the case has no path to be judged on")?;
+        let (model, json, new) = (own.join("model.ron"), own.join("model.json"), own.join("new.ron"));
+        let without: Vec<&str> = left_out.iter().flat_map(|name| ["--without", name]).collect();
+        let error = |more: &[&dyn AsRef<std::ffi::OsStr>]| {
+            let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"diagnose", &case.machine];
+            case.recordings.iter().for_each(|r| arguments.push(r));
+            arguments.extend([&"--json" as &dyn AsRef<std::ffi::OsStr>, &json, &"-o", &model]);
+            arguments.extend(more);
+            self.call(&arguments)?;
+            Ok::<_, String>((self.predicted(&model, judge)?, read_json(&json)?))
+        };
+        let names: Vec<&dyn AsRef<std::ffi::OsStr>> = without.iter().map(|x| x as _).collect();
+        let (family, _) = error(&[])?;
+        let with = |flag: &'static &'static str| [names.as_slice(), &[flag as _, &new]].concat();
+        let (bare, said) = error(&with(&"--propose"))?;
+        let proposed = match new.exists() {
+            true => Some(error(&with(&"--effects"))?.0),
+            false => None,
+        };
+        let _ = std::fs::remove_dir_all(&own);
+        let list = |v: &Value| v.as_array().cloned().unwrap_or_default();
+        let law = |p: &Value| {
+            let terms: Vec<String> =
+                list(&p["law"]).iter().filter_map(|t| t.as_str().map(String::from)).collect();
+            format!("{}: {}", p["at"].as_str().unwrap_or_default(), terms.join(" + "))
+        };
+        let laws = list(&said["proposals"]).iter().map(law).collect();
+        let named = Verdict::read(&said).findings.iter().map(|f| format!("{} {}", f.effect, f.at)).collect();
+        Ok(Trial { family, without: bare, proposed, laws, named })
     }
 
     /// Calls the binary; returns the rules that it says it asked.
