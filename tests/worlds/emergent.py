@@ -198,8 +198,10 @@ def attempt(rng, kind, machines):
         texts.append((text, deviations(machine, c, c.commanded(), clock)))
         clock += np.ceil(len(c.q) * STEP) + REST
     hidden = [] if sort == "clean" else [{"kind": sort, "at": name} | told]
+    # A link lies between two joints, and moves the frame of the second.
+    there = [f.joint for f in machine.joints if hidden and (f.joint == name or f.name == frame)]
     return {"machine": machine.name, "file": machine.path.name, "measurement": instrument.kind, "concealed": [[p["kind"], p["at"]] for p in hidden], "physics": hidden, "samples": len(scene.q),
-            "share_and_rms_um": {n: [float(n == name and bool(hidden)), round(rms * 1e6, 3) if n == name else 0.0] for n in machine.names}, "rms_um": round(rms * 1e6, 3),
+            "share_and_rms_um": {n: [float(n in there), round(rms * 1e6, 3) if n in there else 0.0] for n in machine.names}, "rms_um": round(rms * 1e6, 3),
             "textbook_um": {"plain": None, "column": None, "best": None}, "texts": texts}
 
 
