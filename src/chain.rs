@@ -14,7 +14,7 @@ mod batch;
 mod path;
 
 pub use batch::Batch;
-pub(crate) use path::{Moved, Path};
+pub(crate) use path::{Moved, Path, Row};
 
 /// A machine with constant deviations, ready to be evaluated. Generic over the scalar: the production code and the autodiff
 /// check run the same functions.

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{Chain, Moved, Path};
+use super::{Chain, Moved, Path, Row};
 use crate::lie::{Twist, Vec3, Wrench};
 use crate::scalar::{Lanes, MOST_LANES, Scalar};
 
@@ -131,7 +131,6 @@ impl WithSimd for Walk<'_> {
         let mut moved = vec![Moved::none(none); self.path.joint_count().max(1)];
         let mut velocities = vec![Twist::zero(none); self.path.joint_count()];
         let mut by_command = vec![Twist::zero(none); q.len()];
-        let mut row = vec![none; results.len() / samples];
         let mut from = 0;
         while from < samples {
             // The last samples are those of full lanes, some of them once more.
@@ -142,34 +141,59 @@ impl WithSimd for Walk<'_> {
                 at += samples;
             }
             self.path.go_to(&q, &mut moved);
+            let mut to = Columns { results: &mut *results, from: k, samples };
             match self.want {
                 Want::Poses => {
                     let pose = self.path.w_from_t(&moved, none);
                     let ([x, y, z], [px, py, pz]) = (pose.rotation.0, pose.translation.0);
-                    row.copy_from_slice(&[x[0], x[1], x[2], px, y[0], y[1], y[2], py, z[0], z[1], z[2], pz]);
+                    to.put(0, [x[0], x[1], x[2], px, y[0], y[1]]);
+                    to.put(6, [y[2], py, z[0], z[1], z[2], pz]);
                 }
                 Want::Distances { workpiece_point_w, tool_point_t } => {
                     let p_w = self.path.point_w(tool_point_t.lift(none), &moved);
                     let bar = p_w - workpiece_point_w.lift(none);
-                    row[0] = bar.norm();
-                    let along_w = bar.times(row[0].recip());
-                    self.path.row(Wrench::at_point(along_w, p_w), &moved, &mut row[1..]);
+                    let distance = bar.norm();
+                    to.put(0, [distance]);
+                    let along_w = bar.times(distance.recip());
+                    self.path.row(Wrench::at_point(along_w, p_w), &moved, &mut to);
                 }
                 Want::Velocities { tool_point_t } => {
                     self.path.velocities(tool_point_t.lift(none), &moved, &mut velocities);
                     by_command.fill(Twist::zero(none));
                     self.path.by_command(&velocities, &mut by_command);
-                    for (twist, row) in by_command.iter().zip(row.chunks_exact_mut(6)) {
-                        row.copy_from_slice(&twist.to_array());
+                    for (command, twist) in by_command.iter().enumerate() {
+                        to.put(6 * command, twist.to_array());
                     }
                 }
             }
-            let mut at = k;
-            for value in &row {
-                value.store(&mut results[at..at + S::F64_LANES]);
-                at += samples;
-            }
             from += S::F64_LANES;
         }
+    }
+}
+
+/// Results column by column, from one sample on.
+struct Columns<'a> {
+    results: &'a mut [f64],
+    from: usize,
+    samples: usize,
+}
+
+impl Columns<'_> {
+    /// Neighbouring columns.
+    #[inline(always)]
+    fn put<S: Simd, const N: usize>(&mut self, first: usize, numbers: [Lanes<S>; N]) {
+        let mut at = first * self.samples + self.from;
+        for number in numbers {
+            number.store(&mut self.results[at..at + S::F64_LANES]);
+            at += self.samples;
+        }
+    }
+}
+
+impl<S: Simd> Row<Lanes<S>> for Columns<'_> {
+    /// Behind the distance.
+    #[inline(always)]
+    fn take(&mut self, dyad: usize, six: [Lanes<S>; 6]) {
+        self.put(1 + 6 * dyad, six);
     }
 }

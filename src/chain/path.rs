@@ -75,6 +75,19 @@ pub(crate) struct Moved<T> {
     second: T,
 }
 
+/// Where the numbers of a row go, six for each dyad.
+pub(crate) trait Row<T> {
+    /// Those of one dyad.
+    fn take(&mut self, dyad: usize, six: [T; 6]);
+}
+
+impl<T: Copy> Row<T> for [T] {
+    #[inline(always)]
+    fn take(&mut self, dyad: usize, six: [T; 6]) {
+        self[6 * dyad..6 * dyad + 6].copy_from_slice(&six);
+    }
+}
+
 impl Path {
     /// The way through a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
@@ -159,29 +172,25 @@ impl Path {
         p
     }
 
-    /// Pose of the tool in the workpiece frame.
+    /// Pose of the tool in the workpiece frame. The third column of its rotation is the product of the other two.
     #[inline(always)]
     pub fn w_from_t<T: Scalar>(&self, moved: &[Moved<T>], like: T) -> Pose<T> {
         let mut spans = self.spans.iter().rev();
-        let (mut columns, mut p) = match spans.next() {
+        let (mut x, mut y, mut p) = match spans.next() {
             Some(last) => {
                 let rotation = last.rotation.lift(like);
-                ([rotation.column(0), rotation.column(1), rotation.column(2)], last.shifted(moved))
+                (rotation.column(0), rotation.column(1), last.shifted(moved))
             }
             None => unreachable!("a path ends with a span"),
         };
         for span in spans {
             if let Some(turn) = span.turn {
-                let [x, y, z] = columns;
-                columns = [turn.apply(x, moved), turn.apply(y, moved), turn.apply(z, moved)];
-                p = turn.apply(p, moved);
+                (x, y, p) = (turn.apply(x, moved), turn.apply(y, moved), turn.apply(p, moved));
             }
-            let ([x, y, z], rotation) = (columns, span.rotation.lift(like));
-            columns = [rotation * x, rotation * y, rotation * z];
-            p = rotation * p + span.shifted(moved);
+            let rotation = span.rotation.lift(like);
+            (x, y, p) = (rotation * x, rotation * y, rotation * p + span.shifted(moved));
         }
-        let [x, y, z] = columns;
-        Pose { rotation: Mat3([x.0, y.0, z.0]).transpose(), translation: p }
+        Pose { rotation: Mat3([x.0, y.0, x.cross(y).0]).transpose(), translation: p }
     }
 
     /// [`Path::w_from_t`] at the commands `q`, m or rad.
@@ -283,19 +292,24 @@ impl Path {
 
     /// Six numbers for each dyad, as [`super::Sweep::error_row`] gives them; returns the wrench as frame `t` sees it.
     #[inline(always)]
-    pub fn row<T: Scalar>(&self, y_w: Wrench<T>, moved: &[Moved<T>], row: &mut [T]) -> Wrench<T> {
+    pub fn row<T: Scalar>(
+        &self,
+        y_w: Wrench<T>,
+        moved: &[Moved<T>],
+        row: &mut (impl Row<T> + ?Sized),
+    ) -> Wrench<T> {
         let mut y = y_w;
         for step in &self.steps {
             if step.on_tool {
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
-                row[6 * step.dyad..6 * step.dyad + 6].copy_from_slice(&y.to_array());
+                row.take(step.dyad, y.to_array());
                 y = self.through(step, y, moved);
                 y = step.behind(y);
             } else {
                 y = step.behind(y);
                 y = self.through(step, y, moved);
                 let against = Wrench { f: -y.f, m: -y.m };
-                row[6 * step.dyad..6 * step.dyad + 6].copy_from_slice(&against.to_array());
+                row.take(step.dyad, against.to_array());
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
             }
         }

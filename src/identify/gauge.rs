@@ -3,7 +3,7 @@
 //! [`Evaluator`](super::evaluator::Evaluator) takes one sample of anything. Most passes are over constant deviations and lengths, and
 //! there the same rows come from walks along a [`Path`] with as many samples at a time as there are lanes, `docs/model.md` (14) to (17).
 
-use crate::chain::{Moved, Path};
+use crate::chain::{Moved, Path, Row};
 use crate::lie::{Vec3, Wrench};
 use crate::scalar::Scalar;
 use crate::sensor::{Sensor, SensorState};
@@ -67,17 +67,23 @@ impl<'a> Gauge<'a> {
         self.sensor.of_point(i, p_w, state)
     }
 
-    /// The row of a reading that answers along `n_w`, times `factor`.
+    /// The row of a reading that answers along `n_w`, times `factor`. Six of the extras stand where those of one more dyad would; the
+    /// others, of the tool's rotation, are left as they are: no length changes with that.
     #[inline(always)]
-    pub fn row<T: Scalar>(&self, n_w: Vec3<T>, p_w: Vec3<T>, factor: f64, moved: &[Moved<T>], row: &mut [T]) {
-        let n_w = n_w.times(n_w.0[0].lift(factor));
-        let y_t = self.path.row(Wrench::at_point(n_w, p_w), moved, &mut row[..6 * self.dyads]);
-        let extras = &mut row[6 * self.dyads..];
-        extras[..3].copy_from_slice(&y_t.f.0);
+    pub fn row<T: Scalar>(
+        &self,
+        n_w: Vec3<T>,
+        p_w: Vec3<T>,
+        factor: f64,
+        moved: &[Moved<T>],
+        row: &mut (impl Row<T> + ?Sized),
+    ) {
         let like = n_w.0[0];
-        extras[3] = like.lift(if self.sensor.has_zero() { factor } else { 0.0 });
+        let n_w = n_w.times(like.lift(factor));
+        let Vec3([x, y, z]) = self.path.row(Wrench::at_point(n_w, p_w), moved, row).f;
         let is_relative = matches!(self.sensor, Sensor::Distance { absolute: false });
-        extras[4] = like.lift(if is_relative { -factor } else { 0.0 });
-        extras[5..].fill(like.lift(0.0));
+        let zero = like.lift(if self.sensor.has_zero() { factor } else { 0.0 });
+        let length = like.lift(if is_relative { -factor } else { 0.0 });
+        row.take(self.dyads, [x, y, z, zero, length, like.lift(0.0)]);
     }
 }

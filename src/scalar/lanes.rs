@@ -40,6 +40,7 @@ const FARTHEST: f64 = 2e9;
 
 /// One number for each lane.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(crate) struct Lanes<S: Simd> {
     simd: S,
     values: S::f64s,
