@@ -49,9 +49,9 @@ impl Samples<'_> {
         Arch::new().dispatch(self)
     }
 
-    /// From sample `from` on, of rows of so many numbers, column by column; lanes behind the last sample repeat it.
-    fn columns(&self, from: usize, rows: &[f64], width: usize, to: &mut [f64]) {
-        let (height, last) = (to.len() / width, self.members.len() - 1);
+    /// From sample `from` on, of rows of so many numbers, columns of a height; what is behind the last sample repeats it.
+    fn columns(&self, from: usize, rows: &[f64], width: usize, height: usize, to: &mut [f64]) {
+        let last = self.members.len() - 1;
         for k in 0..height {
             let row = &rows[width * self.members[(from + k).min(last)]..][..width];
             for (c, number) in row.iter().enumerate() {
@@ -108,8 +108,8 @@ impl WithSimd for Samples<'_> {
             let slot = group % GROUPS * S::F64_LANES;
             if slot == 0 {
                 let chunk = &self.stretch.chunk;
-                self.columns(group * S::F64_LANES, &chunk.commands, q.len(), &mut commands);
-                self.columns(group * S::F64_LANES, &chunk.values, count, &mut values);
+                self.columns(group * S::F64_LANES, &chunk.commands, q.len(), height, &mut commands);
+                self.columns(group * S::F64_LANES, &chunk.values, count, height, &mut values);
             }
             take(simd, &commands, height, slot, &mut q);
             take(simd, &values, height, slot, &mut measured[..count]);
@@ -199,8 +199,8 @@ impl WithSimd for Block<'_> {
         let plain_below = count as f64 * self.loss.plain_below();
         for from in (0..members.len()).step_by(height) {
             let filled = (members.len() - from).min(height).div_ceil(S::F64_LANES);
-            self.samples.columns(from, &stretch.chunk.commands, q.len(), &mut commands);
-            self.samples.columns(from, &stretch.chunk.values, count, &mut values);
+            self.samples.columns(from, &stretch.chunk.commands, q.len(), height, &mut commands);
+            self.samples.columns(from, &stretch.chunk.values, count, height, &mut values);
             for group in 0..filled {
                 let first = from + group * S::F64_LANES;
                 take(simd, &commands, height, group * S::F64_LANES, &mut q);
