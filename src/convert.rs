@@ -38,6 +38,7 @@ mod table;
 mod target;
 mod targets;
 mod text;
+mod told;
 #[cfg(feature = "rosbag")]
 mod topics;
 mod unit;
@@ -58,6 +59,7 @@ pub use map::{Map, MappedColumn};
 pub use nominal::Nominal;
 pub use positioning::{BothWays, OneWay, Positioning};
 pub use request::Request;
+pub(crate) use text::decoded;
 pub use write::Written;
 
 use serde::{Deserialize, Serialize};
@@ -66,6 +68,7 @@ use crate::columnar::Form;
 use crate::error::{Error, Place, Result};
 use crate::foreign::{self, Foreign, MCAP, NUMPY, START};
 use crate::machine::Machine;
+use crate::meter::Meter;
 use map::Known;
 use parts::Parts;
 use table::{Table, Told};
@@ -100,11 +103,23 @@ pub fn open(path: impl AsRef<Path>, machine: Option<&Machine>, request: &Request
 /// # Errors
 /// As [`open`], and where several are no bag.
 pub fn open_parts(paths: &[PathBuf], machine: Option<&Machine>, request: &Request) -> Result<Converted> {
+    open_counted(paths, machine, request, &Meter::default())
+}
+
+/// [`open_parts`]; `meter` counts what is read, and each pass over it.
+pub(crate) fn open_counted(
+    paths: &[PathBuf],
+    machine: Option<&Machine>,
+    request: &Request,
+    meter: &Meter,
+) -> Result<Converted> {
     let Parts { files, told } = Parts::of(paths)?;
     let mut parts: Vec<Part> = Vec::new();
+    let length = |path: &PathBuf| path.metadata().ok().filter(|own| own.is_file()).map(|own| own.len());
+    meter.begin(files.iter().map(length).sum());
     for path in &files {
         let fault = |source| Error::file(path, source);
-        let mut file = File::open(path).map_err(fault)?;
+        let mut file = meter.counting(File::open(path).map_err(fault)?);
         let mut bytes = Vec::new();
         (&mut file).take(START as u64).read_to_end(&mut bytes).map_err(fault)?;
         // A recorder that was stopped may have begun a file and written nothing.
@@ -114,7 +129,7 @@ pub fn open_parts(paths: &[PathBuf], machine: Option<&Machine>, request: &Reques
             (true, _) => parts.push((path, Box::new(Cursor::new(bytes).chain(BufReader::new(file))))),
             (false, 1) => {
                 file.read_to_end(&mut bytes).map_err(fault)?;
-                return read(path, &bytes, machine, request);
+                return read_counted(path, &bytes, machine, request, meter);
             }
             (false, _) => {
                 let what = "this is no bag of ROS 2 (MCAP): of other files each is a recording of its own";
@@ -125,7 +140,7 @@ pub fn open_parts(paths: &[PathBuf], machine: Option<&Machine>, request: &Reques
     let Some(file) = paths.first() else {
         return Err(Error::mistake(Place::file(""), "no file is named", "name a table, or a bag"));
     };
-    let mut converted = of_bag(file, parts, machine, request)?;
+    let mut converted = of_bag(file, parts, machine, request, meter)?;
     converted.told.splice(..0, told);
     Ok(converted)
 }
@@ -143,7 +158,13 @@ pub(crate) fn files_of(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 type Part<'a> = (&'a Path, Box<dyn Read + 'a>);
 
 /// The recording of a bag, which messages call `file`.
-fn of_bag(file: &Path, parts: Vec<Part>, machine: Option<&Machine>, request: &Request) -> Result<Converted> {
+fn of_bag(
+    file: &Path,
+    parts: Vec<Part>,
+    machine: Option<&Machine>,
+    request: &Request,
+    meter: &Meter,
+) -> Result<Converted> {
     let known = request.map.as_ref().map(|path| Known::open(path)).transpose()?;
     let mut bagged = bag::read(file, parts, machine, request)?;
     let (known, notes) = match (known, machine) {
@@ -158,7 +179,7 @@ fn of_bag(file: &Path, parts: Vec<Part>, machine: Option<&Machine>, request: &Re
     let mut told = bagged.settled(&known.map, machine)?;
     told.extend(notes);
     told.extend(machine.is_none().then(not_read_back));
-    let recordings = write::all(&known, &bagged.table, machine, &mut told)?;
+    let recordings = write::all(&known, &bagged.table, machine, &mut told, meter)?;
     Ok(Converted { recordings, map: known.map.ron(&told), told, alignment: None, positioning: None })
 }
 
@@ -201,12 +222,23 @@ pub fn read(
     machine: Option<&Machine>,
     request: &Request,
 ) -> Result<Converted> {
-    let file = file.as_ref();
+    read_counted(file.as_ref(), bytes, machine, request, &Meter::default())
+}
+
+/// [`read`]; `meter` counts each pass.
+fn read_counted(
+    file: &Path,
+    bytes: &[u8],
+    machine: Option<&Machine>,
+    request: &Request,
+    meter: &Meter,
+) -> Result<Converted> {
+    told::heads(file, request)?;
     let flag = |name: &str, (what, mend): (String, String)| {
         Error::mistake(Place::file(file), format!("--{name}: {what}"), mend)
     };
     if bytes.starts_with(MCAP) {
-        return of_bag(file, vec![(file, Box::new(bytes))], machine, request);
+        return of_bag(file, vec![(file, Box::new(bytes))], machine, request, meter);
     }
     let start = &bytes[..bytes.len().min(START)];
     let form = Form::of_file(file, start)?;
@@ -242,7 +274,7 @@ pub fn read(
             names: request.names.clone(),
         },
     };
-    let is_r_test = known.is_none() && request.measurement.as_deref() == Some(r_test::WORD);
+    let is_r_test = known.is_none() && request.measurement.as_deref() == Some(request::R_TEST);
     // A map says everything, and columns that are named make a table of their own.
     let is_free = known.is_none() && request.columns.is_empty() && request.path.is_none() && !is_r_test;
     let (table, measured) = if let Some(form) = form {
@@ -260,7 +292,7 @@ pub fn read(
     } else if let Some(head) = targets::head(bytes, &told).filter(|_| is_free) {
         (None, Some(targets::read(file, bytes, &head, machine, request)?))
     } else {
-        (Some(Table::read(file, bytes, &told)?), None)
+        (Some(Table::read(file, bytes, &told, meter)?), None)
     };
     let measured = match (&table, machine) {
         (Some(table), Some(machine)) if is_r_test => Some(r_test::read(table, machine, request)?),
@@ -290,7 +322,7 @@ pub fn read(
     };
     told.extend(machine.is_none().then(not_read_back));
     let Some(path) = &request.path else {
-        let recordings = write::all(&known, &table, machine, &mut told)?;
+        let recordings = write::all(&known, &table, machine, &mut told, meter)?;
         let map = if is_mapped { known.map.ron(&told) } else { String::new() };
         return Ok(Converted { recordings, map, told, alignment: None, positioning });
     };
@@ -301,7 +333,29 @@ pub fn read(
     let map = known.map.clone();
     let followed = follow::follow(&table, known, machine, path, request.sample_rate)?;
     told.extend(followed.told);
-    let recordings = write::all(&followed.known, &followed.table, Some(machine), &mut told)?;
+    let recordings = write::all(&followed.known, &followed.table, Some(machine), &mut told, meter)?;
     let alignment = Some(followed.alignment);
     Ok(Converted { recordings, map: map.ron(&told), told, alignment, positioning: None })
+}
+
+#[cfg(all(test, feature = "cli"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pass_over_a_table_is_counted_to_its_end() {
+        let folder = std::env::temp_dir().join(format!("kincal-passes-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        let slide = "Machine(name: \"slide\", units: (length: mm, angle: deg), workpiece: [(frame: \"w\")],
+            tool: [(frame: \"x\", joint: Prismatic(axis: \"x\")), (frame: \"t\")])";
+        let machine = Machine::parse("slide.ron", slide).expect("a machine");
+        let file = folder.join("log.csv");
+        std::fs::write(&file, "X_cmd (mm);X_act (mm)\n100,5;100,512\n200,5;200,498\n").expect("written");
+        let meter = Meter::default();
+        open_counted(&[file], Some(&machine), &Request::default(), &meter).expect("a recording");
+        std::fs::remove_dir_all(&folder).expect("removed");
+        // The file, its rows, the rows that are written, and what is read back of them.
+        let pass = meter.pass();
+        assert_eq!((pass.number, Some(pass.read)), (4, pass.all));
+    }
 }

@@ -5,6 +5,7 @@
 //! model and judged on stretches that were left out. Where structure is left that no family explains, it says so.
 
 mod approaches;
+mod beside;
 mod blocks;
 mod cell_sums;
 mod cells;

@@ -109,10 +109,12 @@ impl Error {
         match self {
             Error::Input { fault, .. } => fault.mend(),
             Error::Undetermined { mend, .. } | Error::Motion { mend, .. } => mend.clone(),
-            Error::File { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
-                "check the path; nothing is there".into()
-            }
-            Error::File { .. } => String::new(),
+            Error::File { source, .. } => match source.kind() {
+                std::io::ErrorKind::NotFound => "check the path; nothing is there".into(),
+                std::io::ErrorKind::IsADirectory => "name a file, not a folder".into(),
+                std::io::ErrorKind::PermissionDenied => "check who may read and write it".into(),
+                _ => String::new(),
+            },
         }
     }
 

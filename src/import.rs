@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::convert::decoded;
 use crate::error::{Error, Place, Result};
 use crate::machine::{FileUnits, Machine};
 
@@ -201,15 +202,10 @@ pub fn open(path: impl AsRef<Path>, ends: &Ends) -> Result<Imported> {
 pub fn open_with(path: impl AsRef<Path>, options: &ImportOptions) -> Result<Imported> {
     let path = path.as_ref();
     let bytes = std::fs::read(path).map_err(|source| Error::file(path, source))?;
-    imported(path, &text_of(&bytes), options, &|file| {
+    imported(path, &decoded(&bytes), options, &|file| {
         let bytes = std::fs::read(file).map_err(|source| Error::file(file, source))?;
-        Ok(text_of(&bytes))
+        Ok(decoded(&bytes))
     })
-}
-
-/// Descriptions in old encodings have their odd letters in comments; a name that has one is mapped and told.
-fn text_of(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// Reads a description; `file` is only the name that messages use.

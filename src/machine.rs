@@ -53,6 +53,11 @@ impl FileUnits {
         let named = |symbol| Unit::named(symbol).expect("m and rad are units");
         FileUnits { length: named("m"), angle: named("rad") }
     }
+
+    /// The unit of what a joint of this kind is displaced by.
+    pub(crate) fn of(self, kind: JointKind) -> Unit {
+        if kind == JointKind::Revolute { self.angle } else { self.length }
+    }
 }
 
 /// Which of the two lists a dyad stands in.

@@ -35,6 +35,12 @@ impl Meter {
         self.0.passes.fetch_add(1, Relaxed);
     }
 
+    /// So many bytes are done of a pass that reads from no source.
+    #[cfg(feature = "import")]
+    pub fn count(&self, bytes: usize) {
+        self.0.read.fetch_add(bytes as u64, Relaxed);
+    }
+
     /// The same source; what is read from it is counted.
     pub fn counting<R: Read>(&self, source: R) -> Counted<R> {
         Counted { source, meter: self.clone() }

@@ -216,7 +216,7 @@ impl Recording {
     }
 
     /// The same, with the bytes counted that are read of its rows; `alone`: every pass over it begins one of the meter.
-    #[cfg(feature = "cli")]
+    #[cfg(feature = "import")]
     #[must_use]
     pub(crate) fn counted_by(mut self, meter: &Meter, alone: bool) -> Recording {
         self.meter = (meter.clone(), alone);

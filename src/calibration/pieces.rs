@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{DeviationForm, checked, deviation_forms, deviations};
-use crate::machine::{Checked, JointKind, Machine, MachineFault};
+use crate::machine::{Checked, Machine, MachineFault};
 use crate::units::Unit;
 use crate::variation::{Directions, MOST_AXES, Variation, Varying};
 
@@ -124,8 +124,5 @@ pub(super) fn unknown(machine: &Machine, path: &str, joint: &str) -> (String, Ma
 }
 
 pub(super) fn unit(machine: &Machine, command: usize) -> Unit {
-    match machine.command_joint(command).kind {
-        JointKind::Prismatic => machine.units().length,
-        JointKind::Revolute => machine.units().angle,
-    }
+    machine.units().of(machine.command_joint(command).kind)
 }

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use crate::calibration::CalibratedMachine;
 use crate::circular::{CircularTest, circular_tests};
 use crate::identify::{CalibrateOptions, ErrorModel, Figures, Fit, Loss, Solver, calibrate_model};
-use crate::machine::JointKind;
 use crate::machine::Machine;
 use crate::recording::Recording;
 use crate::units::Rms;
@@ -133,10 +132,7 @@ impl Args {
                     mend: format!("add {name} to --directions, or leave it out"),
                 });
             }
-            let quantity = match machine.command_joint(c).kind {
-                JointKind::Prismatic => Quantity::Length,
-                JointKind::Revolute => Quantity::Angle,
-            };
+            let quantity = machine.command_joint(c).kind.quantity();
             let Some(band) = amount(size, quantity).ok().filter(|band| *band >= 0.0) else {
                 let what = format!("--dead-band {text} is not an axis with a size");
                 let units = Unit::symbols_of(quantity);

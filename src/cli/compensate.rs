@@ -137,6 +137,17 @@ pub(crate) fn run(args: &Args) -> Outcome {
     };
     drop(progress);
     let mut text = render(&report, &args.program.display().to_string());
+    if report.moves + report.machine_moves == 0 {
+        let machine = calibrated.machine();
+        let words: Vec<String> =
+            (0..machine.commands().len()).map(|c| machine.command_joint(c).nc_word().address).collect();
+        let _ = writeln!(
+            text,
+            "note: no block moves an axis of {}: its words are {} (`nc` in the machine file names others)",
+            machine.name(),
+            words.join(", ")
+        );
+    }
     if let Some(verified) = &verified {
         let _ = writeln!(
             text,

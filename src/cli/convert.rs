@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::convert::{Nominal, Request, Written, files_of, open_parts};
+use crate::convert::{Nominal, Request, Written, files_of, open_counted};
 use crate::machine::Machine;
 use serde_json::json;
 
@@ -224,7 +224,7 @@ pub(crate) fn run(args: &Args, files: &Files) -> Outcome {
     if let Some(file) = args.files.first() {
         progress.say(&format!("reading {}", file.display()));
     }
-    let converted = open_parts(&args.files, machine.as_ref(), &args.request(path))?;
+    let converted = open_counted(&args.files, machine.as_ref(), &args.request(path), progress.meter())?;
     if args.write_map.is_some() && converted.map.is_empty() {
         return Err(Failure::Told {
             what: format!(

@@ -85,10 +85,8 @@ fn poses(calibrated: &CalibratedMachine, at: &[String]) -> Outcome<Vec<(String, 
             let mend = format!("name one of: {}", machine.commands().join(", "));
             return Err(wrong(format!("\"{}\" is no joint of {}", name.trim(), machine.name()), mend));
         };
-        let (quantity, unit) = match machine.command_joint(c).kind {
-            JointKind::Prismatic => (Quantity::Length, "mm"),
-            JointKind::Revolute => (Quantity::Angle, "deg"),
-        };
+        let quantity = machine.command_joint(c).kind.quantity();
+        let unit = if quantity == Quantity::Angle { "deg" } else { "mm" };
         let mend = || format!("write the joint with its displacement, such as {}=10{unit}", name.trim());
         q[c] = amount(size, quantity).map_err(|what| wrong(what, mend()))?;
     }

@@ -11,7 +11,7 @@ use crate::units::{Quantity, amount};
 
 use super::Common;
 use super::files::{Destination, Output};
-use super::output::{Outcome, length, open_machine, print, write_whole};
+use super::output::{Failure, Outcome, length, open_machine, print, write_whole};
 use super::table::table;
 
 #[derive(clap::Args)]
@@ -47,6 +47,16 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Outcome {
     let calibrated = open_machine(&args.machine, |path| CalibratedMachine::open(path))?;
     let format = Format::named(&args.to).unwrap_or(Format::Iso230);
+    let of_one = [
+        ("axis", args.axis.is_some(), Format::LinuxCncComp),
+        ("base-file", args.base_file.is_some(), Format::Urdf),
+    ];
+    if let Some((flag, _, only)) = of_one.into_iter().find(|(_, told, only)| *told && *only != format) {
+        return Err(Failure::Told {
+            what: format!("--{flag} is of --to {} alone, and this is --to {}", only.name(), format.name()),
+            mend: format!("leave --{flag} out"),
+        });
+    }
     let based =
         |file: &PathBuf| BaseFile::open(file, Ends { base: args.base.clone(), tip: args.tip.clone() });
     let options = ExportOptions {

@@ -6,6 +6,7 @@ use super::Common;
 use super::output::{Failure, Outcome, print};
 use super::table::table;
 use crate::machine::{Machine, SHIPPED, shipped};
+use crate::wording::{nearly, shown};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -18,14 +19,23 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args) -> Outcome {
     let Some(name) = &args.name else { return list(args) };
-    let Some(text) = shipped(name) else {
-        return Err(Failure::Told {
-            what: format!("no machine \"{name}\" comes with the program"),
-            mend: "`kincal machines` lists them".into(),
-        });
-    };
+    let text = shipped(name).ok_or_else(|| unknown(name))?;
     args.common.write_json(&json!({"machine": name, "text": text}))?;
     if args.common.json.is_some() { Ok(()) } else { print(text) }
+}
+
+/// No such machine comes with the program, but perhaps one of nearly the same name.
+pub(super) fn unknown(name: &str) -> Failure {
+    let near = SHIPPED
+        .iter()
+        .map(|(own, _)| *own)
+        .filter(|own| nearly(name, own) || name.len() > 2 && own.contains(&name.to_lowercase()));
+    let near: Vec<&str> = near.collect();
+    let mend = match near.is_empty() {
+        true => "`kincal machines` lists them".into(),
+        false => format!("write {}; `kincal machines` lists all", near.join(" or ")),
+    };
+    Failure::Told { what: format!("no machine \"{}\" comes with the program", shown(name)), mend }
 }
 
 fn list(args: &Args) -> Outcome {

@@ -17,7 +17,7 @@ pub(crate) fn run(args: &Args, mut known: clap::Command) -> Outcome {
     let page = match &args.command {
         None => known,
         Some(name) => match known.find_subcommand(name) {
-            Some(command) => command.clone(),
+            Some(command) => command.clone().version(env!("CARGO_PKG_VERSION")),
             None => {
                 return Err(Failure::Told {
                     what: format!("kincal has no command \"{name}\""),

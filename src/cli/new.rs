@@ -83,12 +83,7 @@ fn made(sketch: &Sketch) -> Result<(Machine, String), Failure> {
 
 /// The file of a machine that comes with the program, under another name and with comments.
 fn copy(like: &str, name: &str) -> Result<(Machine, String), Failure> {
-    let Some(text) = shipped(like) else {
-        return Err(Failure::Told {
-            what: format!("no machine \"{like}\" comes with the program"),
-            mend: "`kincal machines` lists them".into(),
-        });
-    };
+    let text = shipped(like).ok_or_else(|| super::machines::unknown(like))?;
     let own = format!("    name: \"{like}\",");
     let named = text.replacen(&own, &format!("    name: \"{name}\","), 1);
     let text = explained(&format!(

@@ -23,6 +23,8 @@ const LONGEST: f64 = 2.5;
 const CLOCK: f64 = 1e-3;
 /// Difference of misfits, in units of what chance makes of them, that settles which of two alignments holds, and that a path is followed.
 pub(super) const SETTLED: f64 = 25.0;
+/// Times that the shapes are made anew about what was found.
+const ROUNDS: usize = 3;
 /// Residuals beyond this many times the usual are of a bar that is out of its range.
 const FAR: f64 = 8.0;
 
@@ -57,6 +59,7 @@ struct Fit {
 }
 
 /// A part of the readings, and what is compared with them.
+#[derive(Clone)]
 struct Trial<'a> {
     shapes: &'a Shapes,
     clock: Vec<f64>,
@@ -226,10 +229,10 @@ pub(super) fn noise(values: &[f64], readings: usize) -> f64 {
 }
 
 /// Start and end of the path in the readings. `told`: its duration by the clock of the readings, if that is in s; `about`: the shapes
-/// about a machine with amounts of those that were given, since lengths do not grow linearly with what is wrong.
+/// about a machine with amounts of others, since lengths do not grow linearly with what is wrong, and play takes its own width to cross.
 pub(super) fn align(
     shapes: &Shapes,
-    about: impl Fn(&DVector<f64>) -> Shapes,
+    about: impl Fn(&Shapes, &DVector<f64>) -> Shapes,
     readings: &Readings,
     noise: f64,
     told: Option<f64>,
@@ -261,9 +264,14 @@ pub(super) fn align(
     best = full.descend(best, step / 8.0, 0.5 * spacing).0;
     let fit = full.fit(best)?;
     full.leave_out(&full.residuals(best, &fit.shapes));
-    let nearer = about(&full.fit(best)?.shapes);
+    let mut nearer = about(shapes, &full.fit(best)?.shapes);
+    for _ in 1..ROUNDS {
+        let trial = Trial { shapes: &nearer, ..full.clone() };
+        best = trial.descend(best, 4.0 * spacing, 0.02 * spacing).0;
+        nearer = about(&nearer, &trial.fit(best)?.shapes);
+    }
     let full = Trial { shapes: &nearer, ..full };
-    best = full.descend(best, spacing, 2e-3 * spacing).0;
+    best = full.descend(best, 4.0 * spacing, 2e-3 * spacing).0;
     let fit = full.fit(best)?;
     let residuals = full.residuals(best, &fit.shapes);
     let scale = full.scale(&residuals);

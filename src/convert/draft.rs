@@ -132,6 +132,19 @@ impl<'a> Draft<'a> {
         }
     }
 
+    /// Asks about units that were told of columns that are not there.
+    fn ask_columns(&mut self) {
+        let words: Vec<&str> =
+            [Quantity::Length, Quantity::Angle, Quantity::Time].into_iter().filter_map(word).collect();
+        for (key, unit) in &self.request.units {
+            if !words.contains(&key.as_str()) && self.table.column(key) == Found::None {
+                let all: Vec<usize> = (0..self.table.headings.len()).collect();
+                let tell = format!("--unit with {}, or one of: {}", words.join(", "), self.named(&all));
+                self.ask(format!("unit `{unit}` of `{key}`: no column is called so"), tell);
+            }
+        }
+    }
+
     fn hint(&self, columns: &[usize], expected: Option<Quantity>) -> String {
         let ranges = columns.iter().filter_map(|column| self.table.range(*column));
         let Some((low, high)) = ranges.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))) else {
@@ -154,6 +167,7 @@ impl<'a> Draft<'a> {
     /// The map, or all that is open in one message.
     pub fn closed(mut self) -> Result<(Map, Vec<String>)> {
         self.ask_units();
+        self.ask_columns();
         if self.open.is_empty() {
             return Ok((self.map, self.told));
         }

@@ -143,8 +143,10 @@ pub(super) fn follow(
     let free =
         header.zero_unknown || !matches!(header.nominal_length, crate::recording::NominalLength::Known(_));
     let instrument = (sensor, state);
-    let shapes_about = |dh: &[Twist<f64>]| Shapes::new(machine, dh, path, &instrument, free, noise);
-    let shapes = shapes_about(&vec![Twist::zero(0.0); machine.dyads().len()]);
+    let shapes_about =
+        |dh: &[Twist<f64>], gaps: &[f64]| Shapes::new(machine, (dh, gaps), path, &instrument, free, noise);
+    let shapes =
+        shapes_about(&vec![Twist::zero(0.0); machine.dyads().len()], &vec![0.0; machine.commands().len()]);
     let far = readings
         .values
         .iter()
@@ -154,15 +156,20 @@ pub(super) fn follow(
         let what = format!("a reading is {:.3} m from what the path has", far);
         return Err(fault(what, "check the unit of the readings, and `nominal_length` in the head"));
     }
-    let found =
-        align::align(&shapes, |amounts| shapes_about(&shapes.deviations(amounts)), &readings, noise, told)
-            .ok_or_else(|| {
-                fault(
+    let found = align::align(
+        &shapes,
+        |at, amounts| shapes_about(&at.deviations(amounts), &at.gaps(amounts)),
+        &readings,
+        noise,
+        told,
+    )
+    .ok_or_else(|| {
+        fault(
             "no beginning and end of the path can be found: the readings look alike wherever it is laid"
                 .into(),
             "capture both senses of travel, with a stop between and a standstill before and behind",
         )
-            })?;
+    })?;
     judge(&found, path, &readings, noise, in_seconds).map_err(|(what, mend)| fault(what, mend))?;
 
     let per_clock = path.duration() / (found.ends[1] - found.ends[0]);

@@ -147,11 +147,16 @@ fn numbers_of(fields: &[String], comma: bool) -> usize {
     }
 }
 
-/// The number that comes most often.
+/// The number that comes most often; of several that come as often the first, so that what stands above makes the form.
 fn usual(all: impl Iterator<Item = usize>) -> Option<usize> {
-    let mut counts = std::collections::BTreeMap::new();
-    all.for_each(|n| *counts.entry(n).or_insert(0usize) += 1);
-    counts.into_iter().max_by_key(|(_, times)| *times).map(|(n, _)| n)
+    let mut counts: Vec<(usize, usize)> = Vec::new();
+    for n in all {
+        match counts.iter_mut().find(|(own, _)| *own == n) {
+            Some((_, times)) => *times += 1,
+            None => counts.push((n, 1)),
+        }
+    }
+    counts.into_iter().rev().max_by_key(|(_, times)| *times).map(|(n, _)| n)
 }
 
 impl Form {

@@ -8,6 +8,7 @@ use super::measured;
 use super::moment::{self, Moment};
 use super::plan::is_clock;
 use super::table::{Found, Table};
+use super::told;
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
 use crate::units::Quantity;
@@ -32,6 +33,8 @@ pub(super) fn map(table: &Table, machine: &Machine, request: &Request) -> Result
         request.euler.clone().filter(|_| turned)
     });
     measured::channels(&mut draft);
+    told::foreign(&mut draft);
+    told::rotations(&mut draft);
     if table.separator.is_some() {
         draft.map.separator = table.separator.map(|s| s.word().to_string());
         draft.map.decimal = Some(if table.decimal_comma { "comma" } else { "point" }.into());

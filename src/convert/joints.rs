@@ -1,7 +1,7 @@
 //! Which columns hold the commands of a machine's joints, and which what a reference reads of them.
 
 use super::draft::Draft;
-use super::heading::{Heading, words};
+use super::heading::{Heading, Stated, words};
 use super::target::quantity;
 use crate::units::Quantity;
 
@@ -106,11 +106,13 @@ fn candidates(draft: &Draft, joint: &str, read: bool) -> Vec<usize> {
         .collect();
     let best = ranked.iter().map(|(rank, _)| *rank).min();
     if best.is_none() {
-        // Its very name with a unit that does not fit is a question of the unit.
-        let odd = draft.free(None).into_iter().filter(|i| is_read(&draft.table.headings[*i]) == read);
-        let odd: Vec<usize> = odd
-            .filter(|i| rank(&draft.table.headings[*i], joint, without).is_some_and(|rank| rank < 2))
-            .collect();
+        // Its very name with a unit that does not fit is a question of the unit, and its number with one that nobody knows.
+        let is_odd = |i: &usize| {
+            let heading = &draft.table.headings[*i];
+            let far = if matches!(heading.unit, Stated::Other(_)) { 3 } else { 2 };
+            is_read(heading) == read && rank(heading, joint, without).is_some_and(|rank| rank < far)
+        };
+        let odd: Vec<usize> = draft.free(None).into_iter().filter(is_odd).collect();
         if odd.len() == 1 {
             return odd;
         }

@@ -5,16 +5,25 @@ use super::groups::{self, Angles, Group};
 use super::heading::Stated;
 use super::joints;
 use super::matrix;
+use super::request::R_TEST;
 use super::rotation::{CONVENTIONS, Euler};
 use crate::units::Quantity;
+use crate::wording::shown;
+
+/// What a recording may hold, as `--measurement` calls it.
+const KINDS: [&str; 5] = ["position", "pose", "joint", "distance", "displacement"];
 
 /// Takes the measured columns; what is not found or may be read in several ways is asked.
 pub(super) fn take(draft: &mut Draft) {
+    let asked = draft.request.measurement.clone();
+    if let Some(word) = asked.as_ref().filter(|word| !KINDS.contains(&word.as_str())) {
+        let what = format!("measurement `{}` is not known", shown(word));
+        return draft.ask(what, format!("--measurement {}|{}", KINDS.join("|"), R_TEST));
+    }
     if let Some(word) = told(draft) {
         draft.map.measurement = word;
         return;
     }
-    let asked = draft.request.measurement.clone();
     let wants = |word: &str| asked.as_deref().is_none_or(|a| a == word);
     let matrix = if wants("pose") { matrix::find(draft) } else { None };
     if let Some(elements) = matrix {
@@ -31,9 +40,13 @@ pub(super) fn take(draft: &mut Draft) {
     let markers = &draft.request.markers;
     if !markers.is_empty() {
         if let Some(missing) = markers.iter().find(|m| !groups.iter().any(|g| g.name == **m)) {
-            let names: Vec<&str> = groups.iter().map(|g| g.name.as_str()).collect();
+            let names = groups.iter().map(|g| g.name.as_str()).filter(|name| !name.is_empty());
+            let names: Vec<&str> = names.collect();
             let what = format!("marker `{missing}`: the table has none of this name");
-            let tell = format!("--marker with one of: {}", names.join(", "));
+            let tell = match names.is_empty() {
+                true => "leave --marker out: a row has one point at most".into(),
+                false => format!("--marker with one of: {}", names.join(", ")),
+            };
             return draft.ask(what, tell);
         }
         groups.retain(|g| markers.contains(&g.name));

@@ -89,7 +89,10 @@ pub(super) fn read(file: &Path, bytes: &[u8], told: &Told) -> Result<Table> {
         rows.checked_mul(columns).and_then(|n| n.checked_mul(width))
     };
     let data = &bytes[end..];
-    if columns == 0 || rows == 0 || need.is_none_or(|need| need > data.len()) {
+    if rows == 0 {
+        return Err(fault("array has no rows".into(), "save it with a row for each sample"));
+    }
+    if columns == 0 || need.is_none_or(|need| need > data.len()) {
         return Err(short());
     }
     let at = |row: usize, column: usize| -> f64 {

@@ -27,8 +27,6 @@ use crate::machine::{JointKind, Machine};
 use crate::simulate::follow;
 use crate::units::{Quantity, Unit};
 
-/// How `--measurement` calls it.
-pub(super) const WORD: &str = "r-test";
 /// Words of a deviation besides its axis.
 const DEVIATION: [&str; 14] = [
     "d",

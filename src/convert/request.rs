@@ -5,6 +5,9 @@ use std::path::PathBuf;
 
 use super::nominal::Nominal;
 
+/// How `measurement` calls an R-test.
+pub(super) const R_TEST: &str = "r-test";
+
 /// What is known of a table besides what it says itself.
 #[non_exhaustive]
 #[derive(Clone, Debug, Default, PartialEq)]

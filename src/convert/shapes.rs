@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use super::nominal::Nominal;
 use crate::chain::Chain;
 use crate::lie::{Mat3, Twist};
-use crate::machine::{JointKind, Machine};
+use crate::machine::Machine;
 use crate::recording::{Header, Measurement, NominalLength, ToolPoint};
 use crate::sensor::{Sensor, SensorState};
+use crate::units::ByQuantity;
 
 /// Most moments of a path that are looked at.
 const MOMENTS: usize = 40_000;
@@ -18,7 +19,7 @@ const NEGLIGIBLE: f64 = 0.02;
 /// Errors are looked for up to this many tolerances of the machine file.
 const TOLERANCES: f64 = 3.0;
 /// Play, m or rad, and lag of one axis against the others, s, that are looked for besides.
-const PLAY: [f64; 2] = [20e-6, 100e-6];
+const PLAY: ByQuantity<f64> = ByQuantity { m: 20e-6, rad: 100e-6 };
 const LAG: f64 = 1e-3;
 /// Length and zero of an instrument, m: as good as free.
 const LENGTH: f64 = 10e-3;
@@ -37,6 +38,10 @@ pub(super) struct Shapes {
     pub rows: Vec<f64>,
     /// Deviations of all dyads that each shape consists of, m and rad.
     deviations: DMatrix<f64>,
+    /// Half the play of every command that each shape consists of, m or rad.
+    play: DMatrix<f64>,
+    /// The deviations about which these shapes are.
+    about: Vec<Twist<f64>>,
 }
 
 /// The instrument of a recording, if what it reads can be followed along a path.
@@ -60,10 +65,11 @@ pub(super) fn instrument(header: &Header) -> Option<(Sensor, SensorState<f64>)> 
 }
 
 impl Shapes {
-    /// Shapes about a machine with deviations. `noise`: of a reading, m.
+    /// Shapes about a machine with deviations. `gaps`: the travel in which each command crosses its play, m or rad, 0 where it is crossed at
+    /// once; `noise`: of a reading, m.
     pub fn new(
         machine: &Machine,
-        deviations: &[Twist<f64>],
+        (deviations, gaps): (&[Twist<f64>], &[f64]),
         path: &Nominal,
         (sensor, state): &(Sensor, SensorState<f64>),
         free: bool,
@@ -81,10 +87,8 @@ impl Shapes {
         let chain = Chain::new(machine, deviations);
         let sigma: Vec<f64> =
             (0..dyads).flat_map(|j| machine.tolerance(j).to_array().map(|t| TOLERANCES * t)).collect();
-        let play: Vec<f64> = (0..commands)
-            .map(|c| PLAY[usize::from(machine.command_joint(c).kind == JointKind::Revolute)])
-            .collect();
-        let directions = directions(path, &moments);
+        let play: Vec<f64> = (0..commands).map(|c| PLAY[machine.command_joint(c).kind.quantity()]).collect();
+        let sides = sides(path, &moments, gaps);
         let length = if free { 1.0 } else { LENGTH };
         let (mut nominal, mut full) = (Vec::new(), Vec::new());
         let mut row = vec![0.0; all];
@@ -102,7 +106,7 @@ impl Shapes {
                 let mut by = vec![0.0; commands];
                 sweep.command_row(machine, reading.by_twist_w, &mut by);
                 for c in 0..commands {
-                    row[6 * dyads + c] = by[c] * play[c] * f64::from(directions[m][c]);
+                    row[6 * dyads + c] = by[c] * play[c] * sides[m][c];
                     row[6 * dyads + commands + c] = by[c] * speed(c) * LAG;
                 }
                 row[6 * dyads + 2 * commands + i] = length;
@@ -111,36 +115,45 @@ impl Shapes {
             }
         }
         let (basis, rows) = reduced(&full, all, noise);
-        let deviations = DMatrix::from_fn(6 * dyads, basis.ncols(), |k, c| sigma[k] * basis[(k, c)]);
-        Shapes { readings, count: basis.ncols(), nominal, rows, deviations }
+        let (count, about) = (basis.ncols(), deviations.to_vec());
+        let deviations = DMatrix::from_fn(6 * dyads, count, |k, c| sigma[k] * basis[(k, c)]);
+        let play = DMatrix::from_fn(commands, count, |k, c| play[k] * basis[(6 * dyads + k, c)]);
+        Shapes { readings, count, nominal, rows, deviations, play, about }
     }
 
     /// The deviations that amounts of the shapes are, one for each dyad.
     pub fn deviations(&self, amounts: &DVector<f64>) -> Vec<Twist<f64>> {
         let all = &self.deviations * amounts;
-        all.as_slice()
-            .chunks_exact(6)
-            .map(|dh| Twist::from_array([dh[0], dh[1], dh[2], dh[3], dh[4], dh[5]]))
+        let twists = all.as_slice().chunks_exact(6);
+        (self.about.iter())
+            .zip(twists.map(|dh| Twist::from_array([dh[0], dh[1], dh[2], dh[3], dh[4], dh[5]])))
+            .map(|(about, dh)| *about + dh)
             .collect()
+    }
+
+    /// The travel in which each command crosses the play that amounts of the shapes are, m or rad: a drive stands until it is through.
+    pub fn gaps(&self, amounts: &DVector<f64>) -> Vec<f64> {
+        (&self.play * amounts).iter().map(|half| 2.0 * half.abs()).collect()
     }
 }
 
-/// Directions of travel of every command; before the first motion that of the first one.
-fn directions(path: &Nominal, moments: &[usize]) -> Vec<Vec<i8>> {
+/// The side of its play on which every command lies, from -1 to 1; before the first motion that of the first one.
+fn sides(path: &Nominal, moments: &[usize], gaps: &[f64]) -> Vec<Vec<f64>> {
     let commands = path.commands[0].len();
     let first = |c: usize| {
         let mut steps = path.commands.windows(2).map(|p| p[1][c] - p[0][c]);
-        steps.find(|d| d.abs() > MOTION).map_or(0, |d| d.signum() as i8)
+        steps.find(|d| d.abs() > MOTION).map_or(0.0, f64::signum)
     };
-    let mut now: Vec<i8> = (0..commands).map(first).collect();
+    let mut now: Vec<f64> = (0..commands).map(first).collect();
     let (mut at, mut all) = (0, Vec::with_capacity(moments.len()));
     for k in moments {
         while at < *k {
             at += 1;
-            for (c, direction) in now.iter_mut().enumerate() {
+            for (c, side) in now.iter_mut().enumerate() {
                 let d = path.commands[at][c] - path.commands[at - 1][c];
                 if d.abs() > MOTION {
-                    *direction = d.signum() as i8;
+                    // A gap of 0 is crossed at once.
+                    *side = (*side + 2.0 * d / gaps[c].max(MOTION)).clamp(-1.0, 1.0);
                 }
             }
         }

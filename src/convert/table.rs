@@ -9,7 +9,8 @@ use super::form::{self, Form, Separator, is_comment};
 use super::heading::Heading;
 use super::text::decoded;
 use crate::error::{Error, Place, Result};
-use crate::wording::shown;
+use crate::meter::Meter;
+use crate::wording::{count, shown};
 
 /// A row with the number of its line.
 #[derive(Clone, Debug)]
@@ -42,8 +43,8 @@ pub(super) struct Told {
 }
 
 impl Table {
-    /// A table of text.
-    pub fn read(file: &Path, bytes: &[u8], told: &Told) -> Result<Table> {
+    /// A table of text; `meter` counts it.
+    pub fn read(file: &Path, bytes: &[u8], told: &Told, meter: &Meter) -> Result<Table> {
         let text = decoded(bytes);
         let lines: Vec<&str> = text.lines().collect();
         let fail =
@@ -71,7 +72,7 @@ impl Table {
             headings =
                 headings.into_iter().zip(units).map(|(heading, unit)| heading.with_unit(&unit)).collect();
         }
-        let rows = rows(file, &lines, &form)?;
+        let rows = rows(file, &lines, &form, meter)?;
         let table = Table {
             file: file.to_path_buf(),
             headings,
@@ -121,9 +122,11 @@ impl Table {
             self.headings = names.iter().map(|name| Heading::read(name)).collect();
         }
         if self.headings.is_empty() {
-            let what = format!("no row names the {columns} columns");
+            let columns = count(columns as u64, "column", "columns");
+            let what = format!("these are the first numbers, and no row above names their {columns}");
             let mend = "name them from left to right, with their units: `--names 't [s],q1 [deg],...'`";
-            return Err(Error::mistake(place, what, mend));
+            let line = self.rows.first().filter(|_| self.separator.is_some()).map_or(0, |row| row.line);
+            return Err(Error::mistake(Place::at(&self.file, line, 0), what, mend));
         }
         Ok(self)
     }
@@ -225,7 +228,7 @@ pub(super) enum Found {
     Several(Vec<usize>),
 }
 
-fn rows(file: &Path, lines: &[&str], form: &Form) -> Result<Vec<Row>> {
+fn rows(file: &Path, lines: &[&str], form: &Form, meter: &Meter) -> Result<Vec<Row>> {
     let mut rows = Vec::with_capacity(lines.len() - form.first_row);
     let mut take = |line: usize, mut fields: StringRecord| -> Result<()> {
         if fields.iter().all(|field| field.trim().is_empty()) || fields.get(0).is_some_and(is_comment) {
@@ -235,7 +238,8 @@ fn rows(file: &Path, lines: &[&str], form: &Form) -> Result<Vec<Row>> {
             fields.truncate(form.columns);
         }
         if fields.len() != form.columns {
-            let what = format!("row has {} fields, the first row has {}", fields.len(), form.columns);
+            let own = count(fields.len() as u64, "field", "fields");
+            let what = format!("row has {own}, the first row has {}", form.columns);
             let mend = "give every row as many fields; a field without a reading stays empty";
             return Err(Error::mistake(Place::at(file, line, 0), what, mend));
         }
@@ -250,12 +254,13 @@ fn rows(file: &Path, lines: &[&str], form: &Form) -> Result<Vec<Row>> {
         }
         Separator::Byte(byte) => {
             let text = lines[form.first_row..].join("\n");
+            meter.begin(Some(text.len() as u64));
             let mut reader = csv::ReaderBuilder::new()
                 .delimiter(byte)
                 .has_headers(false)
                 .flexible(true)
                 .trim(csv::Trim::All)
-                .from_reader(text.as_bytes());
+                .from_reader(meter.counting(text.as_bytes()));
             for record in reader.records() {
                 let record = record.map_err(|e| {
                     Error::mistake(Place::file(file), e.to_string(), "save the table as text in UTF-8")

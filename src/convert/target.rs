@@ -57,12 +57,7 @@ fn kind_of(machine: &Machine, joint: &str) -> Option<JointKind> {
 
 /// What a column of this name must measure; nothing for an extra channel.
 pub(super) fn quantity(name: &str, machine: Option<&Machine>) -> Option<Quantity> {
-    let of_joint = |joint: &str| {
-        Some(match kind_of(machine?, joint)? {
-            JointKind::Prismatic => Quantity::Length,
-            JointKind::Revolute => Quantity::Angle,
-        })
-    };
+    let of_joint = |joint: &str| Some(kind_of(machine?, joint)?.quantity());
     of_joint(name).or_else(|| match Target::of(name, machine) {
         Target::Time => Some(Quantity::Time),
         Target::Direction | Target::Quaternion(_) => Some(Quantity::One),

@@ -15,6 +15,7 @@ use super::text::decoded;
 use super::unit::{Spelled, spelled};
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
+use crate::meter::Meter;
 use crate::units::Quantity;
 use crate::wording::shown;
 
@@ -253,7 +254,7 @@ pub(super) fn read(
     };
     let comma = request.decimal.as_deref().map(|word| super::map::decimal(word).is_ok_and(|comma| comma));
     let told = Told { separator: Some(head.separator), decimal_comma: comma, names };
-    let mut table = Table::read(file, bytes, &told)?;
+    let mut table = Table::read(file, bytes, &told, &Meter::default())?;
     table.line = head.line + 1;
     table.rows.retain(|row| row.line > head.line + 1);
     let units = Units::of(&table, head, request)?;

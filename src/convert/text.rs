@@ -2,7 +2,7 @@
 
 /// The text without a byte order mark. What is neither UTF-16 with such a mark nor UTF-8 is read as Latin-1, in which `°` and `µ` are single
 /// bytes: numbers are the same in all of them.
-pub(super) fn decoded(bytes: &[u8]) -> String {
+pub(crate) fn decoded(bytes: &[u8]) -> String {
     let wide = |bytes: &[u8], unit: fn([u8; 2]) -> u16| {
         let units: Vec<u16> = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]])).collect();
         String::from_utf16_lossy(&units)

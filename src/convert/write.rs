@@ -12,6 +12,7 @@ use super::rotation;
 use super::table::{Row, Table};
 use crate::error::{Error, Place, Result};
 use crate::machine::Machine;
+use crate::meter::Meter;
 use crate::recording::Recording;
 use crate::wording::shown;
 
@@ -29,12 +30,13 @@ pub struct Written {
     pub with_gaps: u64,
 }
 
-/// The recording of each marker. With a machine they are read back, and what is wrong with them is told of the table.
+/// The recording of each marker. With a machine they are read back, and what is wrong with them is told of the table. `meter` counts both.
 pub(super) fn all(
     known: &Known,
     table: &Table,
     machine: Option<&Machine>,
     told: &mut Vec<String>,
+    meter: &Meter,
 ) -> Result<Vec<Written>> {
     let plan = Plan::new(known, table, machine)?;
     let taken: Vec<&Row> = table
@@ -59,13 +61,15 @@ pub(super) fn all(
         let sheet = Sheet { known, table, columns, turn, zero };
         let head = sheet.head(marker.as_deref());
         let mut written = Written { marker: marker.clone(), text: head, rows: 0, with_gaps: 0 };
+        meter.begin(Some(taken.iter().map(|row| row.fields.as_slice().len() as u64).sum()));
         for row in &taken {
             let gaps = sheet.row(row, &mut written.text)?;
+            meter.count(row.fields.as_slice().len());
             written.rows += 1;
             written.with_gaps += u64::from(gaps);
         }
         if let Some(machine) = machine {
-            sheet.check(&written.text, machine, &taken)?;
+            sheet.check(&written.text, machine, &taken, meter)?;
         }
         Ok(written)
     };
@@ -230,10 +234,14 @@ impl Sheet<'_> {
     }
 
     /// Reads a recording back; a fault in it is told of the row of the table that it comes from.
-    fn check(&self, text: &str, machine: &Machine, rows: &[&Row]) -> Result<()> {
+    fn check(&self, text: &str, machine: &Machine, rows: &[&Row], meter: &Meter) -> Result<()> {
         let file = &self.table.file;
         let read = Recording::from_bytes(&file.to_string_lossy(), text.as_bytes(), machine);
-        let Err(error) = read.and_then(|recording| recording.scan()) else { return Ok(()) };
+        let scanned = read.and_then(|recording| {
+            meter.begin(recording.bytes());
+            recording.counted_by(meter, false).scan()
+        });
+        let Err(error) = scanned else { return Ok(()) };
         let Error::Input { place, fault } = error else { return Err(error) };
         let head = text.lines().take_while(|line| line.starts_with('#')).count() + 1;
         let row = place.line.checked_sub(head + 1).and_then(|k| rows.get(k));

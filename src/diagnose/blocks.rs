@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
 use super::coarse::Level;
-use super::equations::{BATCH, Best, Equations, best, is_of_number, judge, key, lengths, unit};
+use super::equations::{BATCH, Best, Equations, best, judge, key, lengths};
 use super::features::{AtPoint, Features};
 use super::marginal::Marginal;
 use super::score::{Field, Rows};
@@ -45,7 +45,7 @@ impl Rows<'_> {
                 everywhere.push(*i);
                 continue;
             }
-            let count = on_blocks(candidate, level, &answers, &features, &mut columns);
+            let count = on_blocks(candidate, level, &answers, &features, &mut columns.as_view_mut(), false);
             let own = columns.rows(0, count);
             let (mut along, mut g, mut from) = (DMatrix::zeros(marginal.width(), k), DVector::zeros(k), 0);
             for run in features.runs {
@@ -62,13 +62,7 @@ impl Rows<'_> {
             let mut joined = DMatrix::zeros(left.len(), k * batch.len());
             for (b, i) in batch.iter().enumerate() {
                 let Some(features) = kept.at(*i) else { continue };
-                on_blocks(candidate, level, &answers, &features, &mut columns);
-                let (mut from, mut to) = (0, joined.columns_mut(b * k, k));
-                for run in features.runs {
-                    let (first, rows) = level.rows(*run);
-                    to.rows_mut(first, rows).copy_from(&columns.rows(from, rows));
-                    from += rows;
-                }
+                on_blocks(candidate, level, &answers, &features, &mut joined.columns_mut(b * k, k), true);
             }
             judge(&joined.columns(0, k * batch.len()), marginal, left, batch, &mut |i, equations| {
                 table[i] = Some(best(candidate, &grid[i], &lengths, equations, overdispersion, usual));
@@ -94,10 +88,8 @@ impl Rows<'_> {
         if let Some(known) = self.coarse_columns.lock().ok().and_then(|map| map.get(&key).cloned()) {
             return known;
         }
-        let fine = self.answer(slot, direction);
-        let mut white = vec![0.0; fine.len()];
-        self.whitener.apply(&fine, &mut white);
-        let column = Arc::new(self.coarse.levels()[level].reduce(&white));
+        let (white, on) = (self.white_answer(slot, direction), &self.coarse.levels()[level]);
+        let column = if on.is_all() { white } else { Arc::new(on.reduce(&white)) };
         if let Ok(mut map) = self.coarse_columns.lock() {
             map.insert(key, column.clone());
         }
@@ -105,20 +97,18 @@ impl Rows<'_> {
     }
 }
 
-/// Whitened columns of a candidate over the blocks where its features act, run after run; how many rows that are.
+/// Whitened columns of a candidate over the blocks where its features act, run after run, or each row in its place; how many rows that are.
 fn on_blocks(
     candidate: &Candidate,
     level: &Level,
     answers: &[Vec<Arc<Vec<f64>>>],
     features: &AtPoint,
-    to: &mut DMatrix<f64>,
+    to: &mut DMatrixViewMut<f64>,
+    in_place: bool,
 ) -> usize {
     let mut count = 0;
     for (c, coefficient) in candidate.coefficients.iter().enumerate() {
-        let is_number = is_of_number(coefficient);
-        let unit = (coefficient.parts.first()).map_or(0.0, |part| {
-            unit(coefficient.size, features.columns[part.feature], features.samples, is_number)
-        });
+        let unit = features.unit(coefficient);
         let mut column = to.column_mut(c);
         let column = column.as_mut_slice();
         for (p, (part, answer)) in coefficient.parts.iter().zip(&answers[c]).enumerate() {
@@ -127,10 +117,18 @@ fn on_blocks(
                 let (first, rows) = level.rows(*run);
                 let feature = &features.columns[part.feature][at..at + run.1];
                 let (own, samples) = (first..first + rows, &level.sample[first..first + rows]);
-                for ((x, answer), sample) in column[row..row + rows].iter_mut().zip(&answer[own]).zip(samples)
-                {
-                    let more = answer * f64::from(feature[sample - run.0]) * unit;
+                let to = if in_place { first } else { row };
+                let both = column[to..to + rows].iter_mut().zip(&answer[own]);
+                let put = |x: &mut f64, answer: &f64, feature: f32| {
+                    let more = answer * f64::from(feature) * unit;
                     *x = if p == 0 { more } else { *x + more };
+                };
+                // One reading a sample: a row is its sample.
+                match rows == run.1 {
+                    true => both.zip(feature).for_each(|((x, answer), f)| put(x, answer, *f)),
+                    false => both
+                        .zip(samples)
+                        .for_each(|((x, answer), sample)| put(x, answer, feature[sample - run.0])),
                 }
                 (row, at) = (row + rows, at + run.1);
             }

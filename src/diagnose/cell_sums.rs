@@ -57,7 +57,7 @@ impl Rows<'_> {
                 batch.iter().filter_map(|i| Some((*i, kept.at(*i)?))).collect();
             let Some((_, first)) = batch.first() else { continue };
             let answered: Vec<Answered> =
-                keys.iter().map(|key| Answered::of(candidate, *key, &batch, cells)).collect();
+                keys.iter().map(|key| Answered::of(candidate, *key, &batch)).collect();
             let products = Products::of(&answered, first.runs, &sums);
             for (b, (i, _)) in batch.iter().enumerate() {
                 let equations = products.equations(&answered, first.runs, &energies, b, coefficients.len());
@@ -102,7 +102,7 @@ impl Rows<'_> {
 
 impl Answered {
     /// Of points that have the same runs, one after the other.
-    fn of(candidate: &Candidate, of: Key, batch: &[(usize, AtPoint)], cells: &Cells) -> Self {
+    fn of(candidate: &Candidate, of: Key, batch: &[(usize, AtPoint)]) -> Self {
         let rows = batch[0].1.columns.first().map_or(0, |column| column.len());
         let is_own = |p: &&Part<usize>| key(p.slot, p.direction) == of;
         let own: Vec<(usize, &Coefficient)> = (candidate.coefficients.iter().enumerate())
@@ -111,7 +111,7 @@ impl Answered {
         let mut columns: Vec<f64> = Vec::with_capacity(rows * own.len() * batch.len());
         for (_, features) in batch {
             for (_, coefficient) in &own {
-                let unit = cells.unit(coefficient, features);
+                let unit = features.unit(coefficient);
                 let from = columns.len();
                 columns.resize(from + rows, 0.0);
                 for part in coefficient.parts.iter().filter(is_own) {

@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, OnceLock};
 
-use super::equations::{Key, is_of_number, key, unit_of};
+use super::equations::{Key, key};
 use super::features::{AtPoint, Features, is_near};
 use super::linear::Linear;
 use super::panel::Panel;
-use crate::effects::{Candidate, Coefficient};
+use crate::effects::Candidate;
 use crate::feature::{Feature, Samples};
 
 /// About so many cells along one joint, and along each of two; for what is finer along one joint, each sample is a cell, next to its
@@ -70,7 +70,9 @@ impl AllCells {
             sizes.iter().find_map(|strips| {
                 let cells = self.cells(joints.clone(), *strips, linear)?;
                 let samples = (&linear.samples[..], &cells.samples[..]);
-                let features = Features::over(candidate, samples, None, |column| cells.follows(column))?;
+                let follows = |column: &[f64]| cells.follows(column);
+                let rms = |at: &AtPoint, feature: usize| cells.root_mean_square(at, feature);
+                let features = Features::over(candidate, samples, None, follows, rms)?;
                 Some((cells, features))
             })
         };
@@ -166,13 +168,11 @@ impl Cells {
         is_near(column, middle)
     }
 
-    /// What a coefficient is scaled by: the usual size over the root mean square of its first feature over all samples.
-    pub(super) fn unit(&self, coefficient: &Coefficient, features: &AtPoint) -> f64 {
-        let Some(part) = coefficient.parts.first() else { return 0.0 };
+    /// Of a feature over all samples.
+    fn root_mean_square(&self, features: &AtPoint, feature: usize) -> f64 {
         let count = features.runs.iter().flat_map(|(from, count)| &self.count[*from..from + count]);
         let square: f64 =
-            features.columns[part.feature].iter().zip(count).map(|(x, n)| n * f64::from(*x).powi(2)).sum();
-        let rms = (square / self.count.iter().sum::<f64>()).sqrt();
-        unit_of(coefficient.size, rms, is_of_number(coefficient))
+            features.columns[feature].iter().zip(count).map(|(x, n)| n * f64::from(*x).powi(2)).sum();
+        (square / self.count.iter().sum::<f64>()).sqrt()
     }
 }

@@ -2,8 +2,9 @@
 
 use std::sync::OnceLock;
 
-use super::cells::AllCells;
-use super::features::{Features, is_near};
+use super::cells::{AllCells, answers};
+use super::equations::root_mean_square;
+use super::features::{AtPoint, Features, is_near};
 use super::linear::Linear;
 use super::panel::{Panel, WIDTH};
 use crate::effects::Candidate;
@@ -12,6 +13,8 @@ use crate::feature::Samples;
 /// Long blocks of samples, and shorter ones for what changes faster.
 pub(super) struct Coarse {
     levels: Vec<Level>,
+    /// The first candidate that has the features of each over the same grid: what goes by the clock is alike at every frame.
+    alike: Vec<usize>,
     /// Features of each candidate over its grid, once they have been asked for, and the level that they are for.
     kept: Vec<OnceLock<Option<(usize, Features)>>>,
     /// Samples put together where joints stand alike, whenever that was.
@@ -39,7 +42,7 @@ const ROWS: usize = 1200;
 const LONGEST: usize = 8;
 const SHORTER: usize = 3;
 impl Coarse {
-    pub fn new(linear: &Linear, candidates: usize) -> Self {
+    pub fn new(linear: &Linear, candidates: &[Candidate]) -> Self {
         let size = (linear.residual.len() / ROWS).clamp(1, LONGEST);
         let mut sizes = vec![size];
         if size >= 2 * SHORTER {
@@ -50,13 +53,19 @@ impl Coarse {
         }
         Coarse {
             levels: sizes.into_iter().map(|size| Level::new(linear, size)).collect(),
-            kept: (0..candidates).map(|_| OnceLock::new()).collect(),
-            cells: AllCells::new(candidates),
+            alike: alike(candidates),
+            kept: candidates.iter().map(|_| OnceLock::new()).collect(),
+            cells: AllCells::new(candidates.len()),
         }
     }
 
     pub fn levels(&self) -> &[Level] {
         &self.levels
+    }
+
+    /// The candidate that stands for all that have the features of candidate `i` over the same grid.
+    pub fn first_alike(&self, i: usize) -> usize {
+        self.alike[i]
     }
 
     /// Features of candidate `i` over its grid, if they change little within a block, with the number of the level.
@@ -67,6 +76,28 @@ impl Coarse {
         };
         self.kept[i].get_or_init(first).as_ref()
     }
+}
+
+/// For each candidate the first one that has its features over the same grid, for as many columns of as many answers of the machine.
+fn alike(candidates: &[Candidate]) -> Vec<usize> {
+    let mut first: Vec<(usize, usize)> = Vec::new();
+    let is_alike = |(a, of_a): (&Candidate, usize), (b, of_b): (&Candidate, usize)| {
+        of_a == of_b
+            && a.coefficients.len() == b.coefficients.len()
+            && a.features == b.features
+            && a.parameters == b.parameters
+            && a.grid == b.grid
+    };
+    let mut one = |i: usize| {
+        let answers = answers(&candidates[i]).len();
+        let known = |&&(j, of): &&(usize, usize)| is_alike((&candidates[j], of), (&candidates[i], answers));
+        if let Some((j, _)) = first.iter().find(known) {
+            return *j;
+        }
+        first.push((i, answers));
+        i
+    };
+    (0..candidates.len()).map(&mut one).collect()
 }
 
 impl Level {
@@ -127,13 +158,14 @@ impl Level {
 
     fn evaluate(&self, candidate: &Candidate, fine: &[Samples]) -> Option<Features> {
         let follows = |column: &[f64]| self.follows(column);
+        let rms = |at: &AtPoint, feature: usize| root_mean_square(at.columns[feature], at.samples);
         if !candidate.features.iter().any(|f| f.remembers()) {
-            return Features::over(candidate, (fine, &self.samples), None, follows);
+            return Features::over(candidate, (fine, &self.samples), None, follows, rms);
         }
         // What remembers the way it came is followed over every sample.
         let mut middles = self.middle.clone();
         middles.dedup();
-        Features::over(candidate, (fine, fine), Some(&middles), follows)
+        Features::over(candidate, (fine, fine), Some(&middles), follows, rms)
     }
 
     /// Whether a column changes little within a block.

@@ -3,13 +3,17 @@
 //! No play is quite a step and no worm quite a sine. What is left at the place of an effect because of that is taken for its shape and
 //! not for a second effect; and where the shape would have to be most of it, the name is wrong, `docs/diagnosis-method.md` (66).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::curves::{column, product};
-use super::marginal::gram;
+use super::curves::{column, product, squares};
+use super::equations::Column;
+use super::marginal::square;
 use super::score::Rows;
 use super::terms::ModelTerm;
+use super::whitener::FEW;
 use crate::effects::{Candidate, Place};
 use crate::feature::{Feature, Samples};
 use crate::lie::Twist;
@@ -35,10 +39,15 @@ const BEGINNINGS: usize = 64;
 /// Effects with more directions keep the mixture of them that was found.
 pub(super) const MOST_DIRECTIONS: usize = 3;
 
-/// Whitened columns of the shape of an effect, each times what its coefficient may be.
-pub(super) fn columns(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> DMatrix<f64> {
+/// Columns of the shape of an effect, each times what its coefficient may be; `answers`: to its motion.
+pub(super) fn shape(
+    rows: &Rows,
+    candidate: &Candidate,
+    in_model: &ModelTerm,
+    answers: Vec<Column>,
+) -> Unmixed {
     let curves = curves(rows, candidate, &in_model.score.parameters);
-    whitened(rows, answers(rows, candidate, in_model), curves, PART * amplitude(in_model)).white
+    whitened(rows, answers, curves, PART * amplitude(in_model))
 }
 
 /// Columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
@@ -47,8 +56,8 @@ pub(super) fn initial_conditions(
     rows: &Rows,
     candidate: &Candidate,
     in_model: &ModelTerm,
-    answers: Vec<Vec<f64>>,
-) -> Columns {
+    answers: Vec<Column>,
+) -> Unmixed {
     let stretches = &rows.linear.samples;
     let mut curves: Vec<Vec<f64>> = Vec::new();
     let with_history = candidate.features.iter().filter(|f| f.needs_history());
@@ -122,16 +131,31 @@ fn amplitude(in_model: &ModelTerm) -> f64 {
     (&in_model.columns * &in_model.solution).norm()
 }
 
+/// Columns of answers times curves, each as long as it may be, those included that noise hides.
+pub(super) struct Unmixed {
+    /// Whitened.
+    pub white: DMatrix<f64>,
+    /// Which answer and curve they were made of, and by what they were multiplied.
+    made_of: Vec<(usize, usize, f64)>,
+    answers: Vec<Column>,
+    curves: Vec<Vec<f64>>,
+}
+
+impl Unmixed {
+    /// Combinations of them that noise does not hide.
+    pub fn mixed(self) -> Columns {
+        let mixture = seen(square(&self.white));
+        Columns { white: &self.white * &mixture, mixture, of: self }
+    }
+}
+
 /// Columns that noise does not hide, each as long as it may be.
 pub(super) struct Columns {
     /// Whitened.
     pub white: DMatrix<f64>,
-    /// Which answer and curve the whitened columns were made of, and by what they were multiplied.
-    made_of: Vec<(usize, usize, f64)>,
-    /// How these were mixed.
+    /// How those were mixed that it was made of.
     mixture: DMatrix<f64>,
-    answers: Vec<Vec<f64>>,
-    curves: Vec<Vec<f64>>,
+    of: Unmixed,
 }
 
 impl Columns {
@@ -151,9 +175,10 @@ impl Columns {
     pub fn sum(&self, rows: &Rows, numbers: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.white.nrows()];
         let mixed = &self.mixture * DVector::from_column_slice(numbers);
-        for ((answer, curve, scale), number) in self.made_of.iter().zip(mixed.iter()) {
-            let (answer, curve) = (&self.answers[*answer], &self.curves[*curve]);
-            for ((sum, a), sample) in sum.iter_mut().zip(answer).zip(&rows.linear.sample) {
+        let Unmixed { made_of, answers, curves, .. } = &self.of;
+        for ((answer, curve, scale), number) in made_of.iter().zip(mixed.iter()) {
+            let (answer, curve) = (&answers[*answer], &curves[*curve]);
+            for ((sum, a), sample) in sum.iter_mut().zip(answer.iter()).zip(&rows.linear.sample) {
                 *sum += number * scale * a * curve[*sample];
             }
         }
@@ -161,30 +186,38 @@ impl Columns {
     }
 }
 
-/// Columns of answers times curves, each of this norm, without the combinations of them that noise hides.
-fn whitened(rows: &Rows, answers: Vec<Vec<f64>>, curves: Vec<Vec<f64>>, amplitude: f64) -> Columns {
+/// Columns of answers times curves, each of this norm.
+fn whitened(rows: &Rows, answers: Vec<Column>, curves: Vec<Vec<f64>>, amplitude: f64) -> Unmixed {
     let n = rows.residual.len();
     let mut made_of: Vec<(usize, usize, f64)> =
         (0..answers.len()).flat_map(|a| (0..curves.len()).map(move |c| (a, c, 0.0))).collect();
     let mut all = DMatrix::zeros(n, made_of.len());
-    let columns = all.as_mut_slice().par_chunks_mut(n.max(1));
-    columns.zip(&mut made_of).for_each_init(
-        || vec![0.0; n],
-        |plain, (white, (a, c, scale))| {
-            let curve = &curves[*c];
-            for ((plain, answer), sample) in plain.iter_mut().zip(&answers[*a]).zip(&rows.linear.sample) {
-                *plain = answer * curve[*sample];
+    let columns = all.as_mut_slice().par_chunks_mut(FEW * n.max(1));
+    columns.zip(made_of.par_chunks_mut(FEW)).for_each_init(
+        || vec![0.0; FEW * n],
+        |plain, (white, made_of)| {
+            let plain = &mut plain[..white.len()];
+            for (plain, (a, c, _)) in plain.chunks_mut(n.max(1)).zip(&*made_of) {
+                let curve = &curves[*c];
+                let answers = answers[*a].iter();
+                // One reading a sample: a row is its sample.
+                if curve.len() == n {
+                    let both = plain.iter_mut().zip(answers).zip(curve);
+                    both.for_each(|((plain, answer), x)| *plain = answer * x);
+                    continue;
+                }
+                for ((plain, answer), sample) in plain.iter_mut().zip(answers).zip(&rows.linear.sample) {
+                    *plain = answer * curve[*sample];
+                }
             }
-            rows.whitener.apply(plain, white);
-            // Rows that are left out have their part in how long it may be.
-            let squares = |all: bool| -> f64 {
-                let used = plain.iter().zip(&rows.whitener.out).filter(|(_, out)| all || !**out);
-                used.map(|(x, _)| x * x).sum()
-            };
-            let seen = squares(false) / squares(true);
-            let length = (white.iter().map(|x| x * x).sum::<f64>() / seen).sqrt();
-            *scale = if length > 0.0 && length.is_finite() { amplitude / length } else { 0.0 };
-            white.iter_mut().for_each(|x| *x *= *scale);
+            rows.whitener.apply_few(plain, white);
+            let both = plain.chunks(n.max(1)).zip(white.chunks_mut(n.max(1)));
+            for ((plain, white), (.., scale)) in both.zip(made_of) {
+                // Rows that are left out have their part in how long it may be.
+                let length = (squares(white) / rows.whitener.part_in_use(plain)).sqrt();
+                *scale = if length > 0.0 && length.is_finite() { amplitude / length } else { 0.0 };
+                white.iter_mut().for_each(|x| *x *= *scale);
+            }
         },
     );
     let used: Vec<usize> = (0..made_of.len()).filter(|i| made_of[*i].2 > 0.0).collect();
@@ -192,20 +225,17 @@ fn whitened(rows: &Rows, answers: Vec<Vec<f64>>, curves: Vec<Vec<f64>>, amplitud
         all = all.select_columns(&used);
         made_of.retain(|(.., scale)| *scale > 0.0);
     }
-    let (white, mixture) = match made_of.is_empty() {
-        true => (DMatrix::zeros(n, 0), DMatrix::zeros(0, 0)),
-        false => {
-            let mixture = seen(&all);
-            (all * &mixture, mixture)
-        }
-    };
-    Columns { white, made_of, mixture, answers, curves }
+    Unmixed { white: all, made_of, answers, curves }
 }
 
-/// Mixtures of columns with the same covariance `S Sᵀ`, without those that noise hides.
-fn seen(columns: &DMatrix<f64>) -> DMatrix<f64> {
-    let eigen = gram(columns, columns).symmetric_eigen();
-    let kept: Vec<usize> = (0..columns.ncols()).filter(|i| eigen.eigenvalues[*i] > HIDDEN * HIDDEN).collect();
+/// Mixtures of columns with the same covariance `S Sᵀ`, without those that noise hides; `gram`: their Gram matrix.
+pub(super) fn seen(gram: DMatrix<f64>) -> DMatrix<f64> {
+    if gram.is_empty() {
+        return gram;
+    }
+    let eigen = gram.symmetric_eigen();
+    let kept: Vec<usize> =
+        (0..eigen.eigenvalues.len()).filter(|i| eigen.eigenvalues[*i] > HIDDEN * HIDDEN).collect();
     eigen.eigenvectors.select_columns(&kept)
 }
 
@@ -287,7 +317,7 @@ fn index_of(x: &[f64], extreme: impl Fn(f64, f64) -> f64) -> Option<usize> {
 }
 
 /// Answers of the readings to each direction of the effect.
-pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Vec<f64>> {
+pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Column> {
     let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();
     for part in candidate.coefficients[..in_model.score.coefficients].iter().flat_map(|c| &c.parts) {
         let is_known = distinct.iter().any(|(slot, d)| *slot == part.slot && *d == part.direction);
@@ -295,11 +325,11 @@ pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTe
             distinct.push((part.slot, part.direction));
         }
     }
-    distinct.iter().map(|(slot, d)| rows.answer(*slot, *d).to_vec()).collect()
+    distinct.iter().map(|(slot, d)| rows.answer(*slot, *d)).collect()
 }
 
 /// The same, or of many directions to the mixture of them that was found.
-pub(super) fn answers(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Vec<f64>> {
+pub(super) fn answers(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Column> {
     let each = each_answer(rows, candidate, in_model);
     if each.len() <= MOST_DIRECTIONS {
         return each;
@@ -313,7 +343,7 @@ pub(super) fn answers(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) 
             mixture.iter_mut().zip(answer.iter()).for_each(|(sum, a)| *sum += unit * x * a);
         }
     }
-    vec![mixture]
+    vec![Arc::new(mixture)]
 }
 
 /// Distance since a reversal that nobody has seen, m or rad.

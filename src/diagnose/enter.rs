@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::beside::Beside;
 use super::discrepancy;
-use super::equations::Score;
+use super::equations::{Equations, Score};
 use super::evidence::likely_part;
 use super::marginal::{Marginal, solved};
 use super::refine::refine;
@@ -51,39 +52,57 @@ impl Search<'_> {
 
     /// Takes a hypothesis in, at its best point.
     pub fn enter(&self, hypothesis: &Hypothesis, marginal: &Marginal) -> Option<ModelTerm> {
-        let mut effect = self.enter_bare(hypothesis, marginal)?;
         let candidate = &self.candidates[hypothesis.candidate];
-        if self.in_motion && candidate.features.iter().any(Feature::needs_history) {
-            let each = discrepancy::each_answer(self.rows, candidate, &effect);
-            if each.len() > discrepancy::MOST_DIRECTIONS {
-                // Their mixture is found where each of them may have been anything beforehand.
-                let anything = marginal
-                    .with(&discrepancy::initial_conditions(self.rows, candidate, &effect, each).white);
-                let (gram, toward) = self.normal(&effect.columns, &anything);
-                effect.solution = solved(gram, &toward)?;
-            }
-        }
+        let white = self.rows.of(candidate, &hypothesis.score.parameters)?;
+        let left = marginal.apply(&self.rows.residual);
+        let mut effect = self.enter_directed(hypothesis, &white, (marginal, &left))?;
         effect.initial = self.initial_of(&effect);
-        effect.discrepancy = discrepancy::columns(self.rows, candidate, &effect);
+        effect.discrepancy = self.shape_of(&effect);
         Some(effect)
     }
 
     /// The same without initial conditions and discrepancy.
     pub fn enter_bare(&self, hypothesis: &Hypothesis, marginal: &Marginal) -> Option<ModelTerm> {
-        self.enter_as(&self.candidates[hypothesis.candidate], hypothesis, marginal)
+        let candidate = &self.candidates[hypothesis.candidate];
+        let white = self.rows.of(candidate, &hypothesis.score.parameters)?;
+        let left = marginal.apply(&self.rows.residual);
+        self.enter_as(candidate, hypothesis, &white, (marginal, &left))
     }
 
-    /// The same as another candidate than the hypothesis's own.
-    pub fn enter_as(
+    /// The same where many directions of what has a memory are mixed as they are found where each of them may have been anything beforehand.
+    /// `white`: the candidate's columns, `left`: what the marginal leaves of the residuals.
+    pub(super) fn enter_directed(
+        &self,
+        hypothesis: &Hypothesis,
+        white: &DMatrix<f64>,
+        (marginal, left): (&Marginal, &DVector<f64>),
+    ) -> Option<ModelTerm> {
+        let candidate = &self.candidates[hypothesis.candidate];
+        let mut effect = self.enter_as(candidate, hypothesis, white, (marginal, left))?;
+        if self.in_motion && candidate.features.iter().any(Feature::needs_history) {
+            let each = discrepancy::each_answer(self.rows, candidate, &effect);
+            if each.len() > discrepancy::MOST_DIRECTIONS {
+                let anything = discrepancy::initial_conditions(self.rows, candidate, &effect, each).white;
+                let both = Beside::new(&[&anything, &effect.columns], marginal, left);
+                let Equations { gram, toward, .. } = both.seen(1).others().last();
+                effect.solution = solved(gram, &toward)?;
+            }
+        }
+        Some(effect)
+    }
+
+    /// The same as another candidate than the hypothesis's own, and as it stands there.
+    pub(super) fn enter_as(
         &self,
         candidate: &Candidate,
         hypothesis: &Hypothesis,
-        marginal: &Marginal,
+        white: &DMatrix<f64>,
+        (marginal, left): (&Marginal, &DVector<f64>),
     ) -> Option<ModelTerm> {
+        debug_assert_eq!(white.ncols(), candidate.coefficients.len());
         let mut score = hypothesis.score.clone();
-        let columns = self.rows.of(candidate, &score.parameters)?;
-        let mut columns = columns.columns(0, score.coefficients) * score.room;
-        let (mut gram, mut toward) = self.normal(&columns, marginal);
+        let mut columns = white.columns(0, score.coefficients) * score.room;
+        let (mut gram, mut toward) = self.normal_beside(&columns, marginal, left);
         if score.coefficients > 1 {
             let part = likely_part(&gram, &toward, self.overdispersion);
             score.room *= part;
@@ -114,7 +133,7 @@ impl Search<'_> {
         let solution = solved(gram, &toward).unwrap_or_else(|| effect.solution.clone());
         let mut anew = ModelTerm { columns, solution, ..effect.clone() };
         anew.initial = self.initial_of(&anew);
-        anew.discrepancy = discrepancy::columns(self.rows, &self.candidates[effect.candidate], &anew);
+        anew.discrepancy = self.shape_of(&anew);
         anew
     }
 
@@ -128,13 +147,30 @@ impl Search<'_> {
     pub fn initial_conditions_of(&self, effect: &ModelTerm) -> Option<discrepancy::Columns> {
         let candidate = &self.candidates[effect.candidate];
         let answers = || discrepancy::answers(self.rows, candidate, effect);
-        self.in_motion.then(|| discrepancy::initial_conditions(self.rows, candidate, effect, answers()))
+        self.in_motion
+            .then(|| discrepancy::initial_conditions(self.rows, candidate, effect, answers()).mixed())
+    }
+
+    /// Columns by which the shape of an effect may depart from its family's.
+    fn shape_of(&self, effect: &ModelTerm) -> DMatrix<f64> {
+        let candidate = &self.candidates[effect.candidate];
+        let answers = discrepancy::answers(self.rows, candidate, effect);
+        discrepancy::shape(self.rows, candidate, effect, answers).mixed().white
     }
 
     /// Gram matrix of columns beside a marginal, and what leads from them to the residuals.
     pub(super) fn normal(&self, columns: &DMatrix<f64>, marginal: &Marginal) -> (DMatrix<f64>, DVector<f64>) {
+        self.normal_beside(columns, marginal, &marginal.apply(&self.rows.residual))
+    }
+
+    /// The same; `left`: what the marginal leaves of the residuals.
+    fn normal_beside(
+        &self,
+        columns: &DMatrix<f64>,
+        marginal: &Marginal,
+        left: &DVector<f64>,
+    ) -> (DMatrix<f64>, DVector<f64>) {
         let along = marginal.along(&columns.as_view());
-        let gram = columns.tr_mul(columns) - along.tr_mul(&along);
-        (gram, columns.tr_mul(&marginal.apply(&self.rows.residual)))
+        (columns.tr_mul(columns) - along.tr_mul(&along), columns.tr_mul(left))
     }
 }

@@ -16,7 +16,7 @@ use crate::variation::Slot;
 pub(super) const ROOM: f64 = 4.0;
 pub(super) const ROOM_BEYOND: f64 = 2.0;
 /// Numbers of columns that are built at a time: they stay in a core's cache.
-pub(super) const BATCH: usize = 1 << 20;
+pub(super) const BATCH: usize = 1 << 17;
 /// A marginal that leaves less than this part of a column's square leaves next to nothing of it.
 const BARELY: f64 = 1e-2;
 /// More columns than this are multiplied by blocks.
@@ -44,9 +44,14 @@ impl Equations {
     pub fn of(columns: &DMatrixView<f64>, along: &DMatrixView<f64>, toward: DVector<f64>) -> Self {
         let (own, taken) = match columns.ncols() > WIDE {
             true => (columns.transpose() * columns, along.transpose() * along),
-            false => (columns.tr_mul(columns), along.tr_mul(along)),
+            false => (squares(columns), squares(along)),
         };
         Equations { whole: own.diagonal(), gram: own - taken, toward }
+    }
+
+    /// `own`: Gram matrix of the columns, `gram`: of what the marginal leaves of them.
+    pub fn new(own: DMatrix<f64>, gram: DMatrix<f64>, toward: DVector<f64>) -> Self {
+        Equations { whole: own.diagonal(), gram, toward }
     }
 
     /// `own`: Gram matrix of the columns.
@@ -58,6 +63,18 @@ impl Equations {
     fn is_faint(&self, columns: usize) -> bool {
         (0..columns).any(|c| self.gram[(c, c)] < BARELY * self.whole[c])
     }
+}
+
+/// `aᵀ a` of few columns, half of it computed.
+fn squares(a: &DMatrixView<f64>) -> DMatrix<f64> {
+    let mut squares = DMatrix::zeros(a.ncols(), a.ncols());
+    for i in 0..a.ncols() {
+        for j in 0..=i {
+            let product = a.column(i).dot(&a.column(j));
+            (squares[(i, j)], squares[(j, i)]) = (product, product);
+        }
+    }
+    squares
 }
 
 /// What tells a column: kind of slot, joint, direction.
@@ -162,18 +179,18 @@ pub(super) fn unit_size(coefficient: &Coefficient, features: &[Vec<f64>]) -> f64
     let is_number = is_of_number(coefficient);
     coefficient.parts.first().map_or(0.0, |part| {
         let feature = &features[part.feature];
-        unit(coefficient.size, feature, feature.len(), is_number)
+        unit_of(coefficient.size, root_mean_square(feature, feature.len()), is_number)
     })
 }
 
-/// 0 where the feature is next to nothing at every sample: nobody can see it there, and its coefficient could be anything. `feature`: where
-/// it does not vanish, of so many samples.
-pub(super) fn unit<X: Copy + Into<f64>>(size: f64, feature: &[X], samples: usize, is_number: bool) -> f64 {
+/// Of a feature that is given where it does not vanish, of so many samples.
+pub(super) fn root_mean_square<X: Copy + Into<f64>>(feature: &[X], samples: usize) -> f64 {
     let square = |x: &X| (*x).into() * (*x).into();
-    unit_of(size, (feature.iter().map(square).sum::<f64>() / samples.max(1) as f64).sqrt(), is_number)
+    (feature.iter().map(square).sum::<f64>() / samples.max(1) as f64).sqrt()
 }
 
-/// The same of a feature with this root mean square.
+/// The usual size over the root mean square of a feature; 0 where that is next to nothing at every sample: nobody can see it there, and its
+/// coefficient could be anything.
 pub(super) fn unit_of(size: f64, rms: f64, is_number: bool) -> f64 {
     if rms > if is_number { FAINT } else { ROUNDING } { size / rms } else { 0.0 }
 }

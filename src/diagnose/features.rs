@@ -1,6 +1,7 @@
 //! Features of a candidate over its grid, at samples that stand for others.
 
-use crate::effects::Candidate;
+use super::equations::{is_of_number, unit_of};
+use crate::effects::{Candidate, Coefficient};
 use crate::feature::Samples;
 
 /// A feature whose root mean square changes by less than this part within a block counts as smooth.
@@ -14,10 +15,12 @@ const MOST_KEPT: usize = 40_000_000;
 pub(super) struct Features {
     /// Point by point, feature by feature, sample by sample of its runs.
     values: Vec<f32>,
-    /// Where each point's values begin, and its runs.
-    points: Vec<(usize, usize)>,
+    /// Where each point's values begin, and its runs; whether all of them are finite.
+    points: Vec<(usize, usize, bool)>,
     /// Runs of samples outside of which all features of a point vanish: first one, number.
     runs: Vec<(usize, usize)>,
+    /// Root mean square of each feature over all that the samples stand for, point by point.
+    rms: Vec<f64>,
     features: usize,
     samples: usize,
 }
@@ -30,9 +33,18 @@ pub(super) struct AtPoint<'a> {
     pub columns: Vec<&'a [f32]>,
     /// How many samples there are in all.
     pub samples: usize,
+    /// Root mean squares over all that the samples stand for, one a feature.
+    rms: &'a [f64],
 }
 
 impl AtPoint<'_> {
+    /// What a coefficient is scaled by: the usual size over the root mean square of its first feature.
+    pub fn unit(&self, coefficient: &Coefficient) -> f64 {
+        let is_number = is_of_number(coefficient);
+        let of = |feature: usize| unit_of(coefficient.size, self.rms[feature], is_number);
+        coefficient.parts.first().map_or(0.0, |part| of(part.feature))
+    }
+
     /// Part of the samples where they do not vanish.
     pub fn part(&self) -> f64 {
         self.columns.first().map_or(0.0, |column| column.len() as f64 / self.samples.max(1) as f64)
@@ -42,37 +54,51 @@ impl AtPoint<'_> {
 impl Features {
     /// Of one point; `None` where a value is not finite.
     pub fn at(&self, point: usize) -> Option<AtPoint<'_>> {
-        let (from, first) = self.points[point];
+        let is_finite = self.points[point].2;
+        let rms = &self.rms[point * self.features..(point + 1) * self.features];
+        is_finite.then(|| AtPoint { rms, ..self.values(point) })
+    }
+
+    /// The same, finite or not, before it is known how large they are.
+    fn values(&self, point: usize) -> AtPoint<'_> {
+        let (from, first, _) = self.points[point];
         let last = self.points.get(point + 1).map_or(self.runs.len(), |next| next.1);
         let runs = &self.runs[first..last];
         let count: usize = runs.iter().map(|run| run.1).sum();
         let all = &self.values[from..from + count * self.features];
         let columns = (0..self.features).map(|f| &all[f * count..(f + 1) * count]).collect();
-        all.iter().all(|x| x.is_finite()).then_some(AtPoint { runs, columns, samples: self.samples })
+        AtPoint { runs, columns, samples: self.samples, rms: &[] }
     }
 
     /// Of a candidate over its grid, at samples that stand for others, or of these those that are picked; `None` where there are too many numbers
-    /// or they do not follow all samples.
+    /// or they do not follow all samples. `rms`: root mean square of a feature at a point over all that the samples stand for.
     pub fn over(
         candidate: &Candidate,
         (all, seen): (&[Samples], &[Samples]),
         picked: Option<&[usize]>,
         follows: impl Fn(&[f64]) -> bool,
+        rms: impl Fn(&AtPoint, usize) -> f64,
     ) -> Option<Self> {
         let features = candidate.features.len();
         let samples = picked.map_or_else(|| seen.iter().map(|s| s.len).sum(), <[usize]>::len);
         if candidate.grid.len() * features * samples > MOST_KEPT || !is_smooth(candidate, all, follows) {
             return None;
         }
-        let mut kept =
-            Features { values: Vec::new(), points: Vec::new(), runs: Vec::new(), features, samples };
+        let (values, points, runs) = (Vec::new(), Vec::new(), Vec::new());
+        let mut kept = Features { values, points, runs, rms: Vec::new(), features, samples };
         candidate.scan(seen, |_, columns| kept.push(columns, |k| picked.map_or(k, |picked| picked[k])));
+        kept.values.shrink_to_fit();
+        let each = |point: usize| {
+            let (at, rms) = (kept.values(point), &rms);
+            (0..features).map(move |feature| rms(&at, feature)).collect::<Vec<f64>>()
+        };
+        kept.rms = (0..kept.points.len()).flat_map(each).collect();
         Some(kept)
     }
 
     /// Puts a point behind the others.
     fn push(&mut self, columns: &[Vec<f64>], picked: impl Fn(usize) -> usize) {
-        self.points.push((self.values.len(), self.runs.len()));
+        let (from, first) = (self.values.len(), self.runs.len());
         let largest: Vec<f64> =
             columns.iter().map(|c| c.iter().fold(0.0, |most, x| x.abs().max(most))).collect();
         let acts = |k: &usize| {
@@ -81,7 +107,6 @@ impl Features {
                 !x.is_finite() || x.abs() > VANISHES * most
             })
         };
-        let first = self.runs.len();
         let mut k = 0;
         while let Some(from) = (k..self.samples).find(acts) {
             k = (from..self.samples).find(|k| !acts(k)).unwrap_or(self.samples);
@@ -92,6 +117,7 @@ impl Features {
                 self.values.extend((*from..from + count).map(|k| column[picked(k)] as f32));
             }
         }
+        self.points.push((from, first, self.values[from..].iter().all(|x| x.is_finite())));
     }
 }
 

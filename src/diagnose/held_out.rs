@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::marginal::{gram, with_prior};
+use super::marginal::{square, with_prior};
 use super::search::Search;
 use super::terms::ModelTerm;
 use crate::effects::{Candidate, Identified, Library};
@@ -62,7 +62,7 @@ impl Model {
             }
         }
         let toward = columns.tr_mul(&search.rows.residual);
-        let solution = match with_prior(gram(&columns, &columns)) {
+        let solution = match with_prior(square(&columns)) {
             Some(factor) => factor.solve(&toward),
             None => toward,
         };
@@ -163,7 +163,7 @@ impl Model {
             wide = wide.insert_columns(at, effect.discrepancy.ncols(), 0.0);
             wide.columns_mut(at, effect.discrepancy.ncols()).copy_from(&(&effect.discrepancy * discrepancy));
         }
-        let Some(factor) = with_prior(gram(&wide, &wide)) else { return Solved { coefficients, covariance } };
+        let Some(factor) = with_prior(square(&wide)) else { return Solved { coefficients, covariance } };
         let inverse = factor.inverse();
         let place = |x: usize| -> (usize, f64) {
             if x < k { (own(x), scale(x)) } else { (at + x - k, slopes[x - k].2) }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn, SVD};
+use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn, MatrixView, SVD};
 
 use super::panel::{Panel, WIDTH, add_along, take_away};
 
@@ -62,21 +62,21 @@ impl Marginal {
             return self.clone();
         }
         let beside = self.beside(columns);
-        let Some(factor) = with_prior(gram(columns, &beside)) else { return self.clone() };
+        let Some(factor) = with_prior(symmetric(columns, &beside)) else { return self.clone() };
         // W = M C L⁻ᵀ, so that Wᵀ = L⁻¹ (M C)ᵀ.
-        let mut back = DMatrix::identity(columns.ncols(), columns.ncols());
+        let count = columns.ncols();
+        let mut back = DMatrix::identity(count, count);
         factor.l_dirty().solve_lower_triangular_mut(&mut back);
-        self.and(&(back * beside.transpose()))
+        self.and(&match count > WIDE && columns.nrows() > WIDE {
+            true => back * turned(beside.as_slice(), beside.shape()),
+            false => back * beside.transpose(),
+        })
     }
 
     /// Logarithm of the evidence of further columns, each times its prior standard deviation, with what is left of `y` beside the marginal.
     pub fn worth(&self, columns: &DMatrix<f64>, left: &DVector<f64>, overdispersion: f64) -> f64 {
-        let Some(factor) = with_prior(gram(columns, &self.beside(columns)) / overdispersion) else {
-            return 0.0;
-        };
-        let toward = columns.tr_mul(left) / overdispersion;
-        0.5 * toward.dot(&factor.solve(&toward))
-            - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+        let gram = square(columns) - square(&self.along(&columns.as_view()));
+        worth_of(gram, &columns.tr_mul(left), overdispersion)
     }
 
     /// What of columns is across to these others: `C - D (DᵀM D)⁻¹ DᵀM C`.
@@ -133,9 +133,55 @@ pub(super) fn with_prior(mut gram: DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
     Cholesky::new(gram)
 }
 
+/// Logarithm of the evidence of columns with this Gram matrix beside a marginal, which lead `toward` what that leaves of the residuals.
+pub(super) fn worth_of(gram: DMatrix<f64>, toward: &DVector<f64>, overdispersion: f64) -> f64 {
+    let Some(factor) = with_prior(gram / overdispersion) else { return 0.0 };
+    let toward = toward / overdispersion;
+    0.5 * toward.dot(&factor.solve(&toward)) - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
+}
+
+/// Products of more columns than this, of both factors, go by blocks.
+const WIDE: usize = 5;
+
 /// `aᵀ b` of tall matrices, by blocks that stay in a core's cache; nalgebra's `tr_mul` goes column by column.
 pub(super) fn gram(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    a.transpose() * b
+    match a.ncols() > WIDE && b.ncols() > WIDE && a.nrows() > 0 {
+        true => turned(a.as_slice(), a.shape()) * b,
+        false => a.transpose() * b,
+    }
+}
+
+/// Columns of `aᵀ a` that are computed at a time, from the diagonal on: half of a symmetric product tells all of it.
+const STRIP: usize = 16;
+
+/// `aᵀ a` of tall matrices.
+pub(super) fn square(a: &DMatrix<f64>) -> DMatrix<f64> {
+    symmetric(a, a)
+}
+
+/// `aᵀ b` of tall matrices where that is symmetric.
+fn symmetric(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let (rows, count) = a.shape();
+    if count <= WIDE || rows <= WIDE {
+        return a.tr_mul(b);
+    }
+    let mut product = DMatrix::zeros(count, count);
+    for from in (0..count).step_by(STRIP) {
+        let (strip, rest) = (STRIP.min(count - from), count - from);
+        let own = match strip > WIDE {
+            true => turned(&a.as_slice()[from * rows..], (rows, rest)) * b.columns(from, strip),
+            false => a.columns(from, rest).tr_mul(&b.columns(from, strip)),
+        };
+        product.view_mut((from, from), (rest, strip)).copy_from(&own);
+        product.view_mut((from, from), (strip, rest)).tr_copy_from(&own);
+    }
+    product
+}
+
+/// The transposed of columns that lie one behind the other, without a copy: blocks are packed from them as they lie. Products with no more than
+/// [`WIDE`] rows or columns may not be made of it: nalgebra makes those column by column, as if rows lay one behind the other.
+fn turned(columns: &[f64], (rows, count): (usize, usize)) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
+    MatrixView::from_slice_with_strides_generic(columns, Dyn(count), Dyn(rows), Dyn(rows), Dyn(1))
 }
 
 /// Coefficients from normal equations, with their prior.

@@ -19,6 +19,7 @@ use super::parts::{Unnamed, is_foretold};
 use super::policy::Rule;
 use super::search::Search;
 use super::terms::{Hypothesis, ModelTerm, side_by_side};
+use crate::effects::Place;
 use crate::feature::Dependence;
 
 /// Parts of its size by which the shape of what happens may depart from its family's; each is as likely beforehand.
@@ -36,8 +37,7 @@ pub(super) const LIKELY: f64 = 0.5;
 /// Parts that belong together: at one place, driven by the same joints.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Group {
-    /// The dyad of the place; `None` for the instrument.
-    place: Option<usize>,
+    place: Place,
     /// Dyads of the joints that it depends on, in their order.
     drivers: Vec<usize>,
 }
@@ -155,7 +155,7 @@ impl Unnamed {
         let mut drivers: Vec<usize> = on.filter_map(joint).collect();
         drivers.sort_unstable();
         drivers.dedup();
-        Group { place: candidate.place.dyad(), drivers }
+        Group { place: candidate.place.seat(), drivers }
     }
 
     /// The groups of these parts by how much of what is there goes with all parts of a group together, most first.
@@ -181,7 +181,7 @@ impl Unnamed {
     /// Names for what the group of `own`, which is all of it, does beside the `others`. `search`: with free functions.
     fn names(&self, search: &Search, own: &[ModelTerm], others: &[ModelTerm]) -> Option<Names> {
         let group = self.group(own.first()?);
-        let here = |c: &usize| self.group_of(*c) == group && !search.goes_by_clock(*c);
+        let here = |c: &usize| self.group_of(*c) == group;
         let all: Vec<usize> = (0..self.candidates.len()).filter(here).collect();
         let (families, free): (Vec<usize>, Vec<usize>) = all.into_iter().partition(|c| *c < self.first);
         // By how much chance is larger than the noise says counts against all of them alike.

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use super::linear::{Linear, Span};
 use super::policy::Rule;
+use crate::effects::RecordingFacts;
 
 /// Noise of one kind of reading: first-order autoregressive, and rounding to the step of its readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -201,6 +202,34 @@ pub(super) fn waiting(linear: &Linear) -> Vec<bool> {
     waiting
 }
 
+/// Noise of every run, from what a model leaves; runs of the same quantity share theirs.
+pub(super) fn of(
+    linear: &Linear,
+    left: &[f64],
+    runs: &[Vec<usize>],
+    out: &[bool],
+    facts: &RecordingFacts,
+) -> Vec<Noise> {
+    let smooth = facts.are_smooth();
+    let estimate = |angle: bool| {
+        let own: Vec<&Vec<usize>> =
+            runs.iter().filter(|run| run.first().is_some_and(|r| linear.angle[*r] == angle)).collect();
+        if facts.approached
+            && let Some(noise) = repeated(linear, left, &own, out)
+        {
+            return noise;
+        }
+        match !smooth && facts.time.is_some() && without_order(linear) {
+            true => remembered(left, &own, out, linear.step(angle)),
+            false => estimate(left, &own, out, smooth, linear.step(angle)),
+        }
+    };
+    let (length, angle) = (estimate(false), estimate(true));
+    runs.iter()
+        .map(|run| if run.first().is_some_and(|r| linear.angle[*r]) { angle } else { length })
+        .collect()
+}
+
 /// Half the mean square of differences over `lag` readings, outliers left out, what is beyond four standard deviations cut off.
 fn structure(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], lag: usize) -> Option<f64> {
     let mut squares: Vec<f64> = Vec::new();
@@ -238,13 +267,7 @@ fn neighbours(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], rounding: f6
 
 /// Noise of some runs that share it. `smooth`: whether the path is followed continuously, so that neighbours see the same misfit;
 /// `step`: of the readings, m or rad.
-pub(super) fn estimate(
-    residual: &[f64],
-    runs: &[&Vec<usize>],
-    out: &[bool],
-    smooth: bool,
-    step: f64,
-) -> Noise {
+fn estimate(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], smooth: bool, step: f64) -> Noise {
     let all: Vec<f64> =
         runs.iter().flat_map(|run| run.iter()).filter(|r| !out[**r]).map(|r| residual[*r]).collect();
     let total = (all.iter().map(|r| r * r).sum::<f64>() / all.len().max(1) as f64).max(FINEST * FINEST);
@@ -280,7 +303,7 @@ const REMEMBERED: f64 = 2.5;
 const LASTING: f64 = 5.0;
 
 /// Whether settled positions follow each other without order, so that what neighbours have in common is no misfit of the machine.
-pub(super) fn without_order(linear: &Linear) -> bool {
+fn without_order(linear: &Linear) -> bool {
     let joints = linear.samples.first().map_or(0, |s| s.joints.len());
     let alike = |j: usize| {
         let columns = || linear.samples.iter().filter_map(|s| s.joints[j].as_ref());
@@ -295,7 +318,7 @@ pub(super) fn without_order(linear: &Linear) -> bool {
 }
 
 /// Noise of settled positions without order: what is left, and what neighbours have in common. `step`: of the readings, m or rad.
-pub(super) fn remembered(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], step: f64) -> Noise {
+fn remembered(residual: &[f64], runs: &[&Vec<usize>], out: &[bool], step: f64) -> Noise {
     let noise = estimate(residual, runs, out, false, 0.0);
     let rounding = (step * step / 12.0).min(MOST_ROUNDED * noise.sigma.powi(2));
     let count = runs.iter().flat_map(|run| run.iter()).filter(|row| !out[**row]).count();
@@ -318,12 +341,7 @@ const SAME_PLACE: f64 = 1e-4;
 
 /// Noise of positions that were approached again and again from the same side: what their readings scatter, whatever the misfit.
 /// `None` where too few were.
-pub(super) fn repeated(
-    linear: &Linear,
-    residual: &[f64],
-    runs: &[&Vec<usize>],
-    out: &[bool],
-) -> Option<Noise> {
+fn repeated(linear: &Linear, residual: &[f64], runs: &[&Vec<usize>], out: &[bool]) -> Option<Noise> {
     let extents: Vec<f64> = (0..linear.samples.first()?.joints.len())
         .map(|j| {
             let all = linear.samples.iter().flat_map(|s| s.joints[j].iter().flat_map(|c| &c.position));

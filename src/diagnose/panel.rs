@@ -81,27 +81,51 @@ fn add_some_along(panels: &[Arc<Panel>], first: usize, c: &DMatrixView<f64>, to:
     let arch = Arch::new();
     let wide = panels.len() * WIDTH;
     let columns: Vec<_> = c.column_iter().collect();
+    let fours = columns.len() / 4 * 4;
+    let mut rows: Vec<&[[f64; WIDTH]]> = Vec::with_capacity(panels.len());
     for from in (0..c.nrows()).step_by(ROWS) {
         let count = ROWS.min(c.nrows() - from);
-        for (p, panel) in panels.iter().enumerate() {
-            let rows = &panel.rows[first + from..first + from + count];
-            let mut add = |k: usize, sums: &[[f64; WIDTH]]| {
-                for (k, sums) in (k..).zip(sums) {
-                    let to = &mut to[k * wide + p * WIDTH..][..WIDTH];
-                    to.iter_mut().zip(sums).for_each(|(to, x)| *to += x);
-                }
-            };
-            let own = |k: usize| &columns[k].as_slice()[from..from + count];
-            let mut k = 0;
-            while k < columns.len() {
-                match columns.len() - k {
-                    1 => add(k, &arch.dispatch(Along { rows, c: [own(k)] })),
-                    2 => add(k, &arch.dispatch(Along { rows, c: [own(k), own(k + 1)] })),
-                    3 => add(k, &arch.dispatch(Along { rows, c: [own(k), own(k + 1), own(k + 2)] })),
-                    _ => add(k, &arch.dispatch(Along { rows, c: [0, 1, 2, 3].map(|j| own(k + j)) })),
-                }
-                k += 4;
+        rows.clear();
+        rows.extend(panels.iter().map(|panel| &panel.rows[first + from..first + from + count]));
+        let own = |k: usize| &columns[k].as_slice()[from..from + count];
+        for (pair, rows) in rows.chunks(2).enumerate() {
+            for k in (0..fours).step_by(4) {
+                let to = &mut to[k * wide + 2 * pair * WIDTH..];
+                add_few::<2, 4>(arch, rows, [own(k), own(k + 1), own(k + 2), own(k + 3)], to, wide);
             }
+        }
+        let (k, to) = (fours, &mut to[fours * wide..]);
+        match columns.len() - fours {
+            0 => {}
+            1 => add_few::<4, 1>(arch, &rows, [own(k)], to, wide),
+            2 => add_few::<4, 2>(arch, &rows, [own(k), own(k + 1)], to, wide),
+            _ => add_few::<2, 3>(arch, &rows, [own(k), own(k + 1), own(k + 2)], to, wide),
+        }
+    }
+}
+
+/// The same of `K` columns, `P` panels at a time: a sum waits for the one before it, and others can be seen to meanwhile.
+fn add_few<const P: usize, const K: usize>(
+    arch: Arch,
+    panels: &[&[[f64; WIDTH]]],
+    c: [&[f64]; K],
+    to: &mut [f64],
+    wide: usize,
+) {
+    let mut add = |p: usize, sums: &[[[f64; WIDTH]; K]]| {
+        for (p, sums) in (p..).zip(sums) {
+            for (k, sums) in sums.iter().enumerate() {
+                let to = &mut to[k * wide + p * WIDTH..][..WIDTH];
+                to.iter_mut().zip(sums).for_each(|(to, x)| *to += x);
+            }
+        }
+    };
+    for (some, rows) in panels.chunks(P).enumerate() {
+        match <[&[[f64; WIDTH]]; P]>::try_from(rows) {
+            Ok(rows) => add(some * P, &arch.dispatch(Along { rows, c })),
+            Err(_) => (some * P..)
+                .zip(rows)
+                .for_each(|(p, rows)| add(p, &arch.dispatch(Along { rows: [*rows], c }))),
         }
     }
 }
@@ -127,29 +151,34 @@ pub(super) fn take_away(panels: &[Arc<Panel>], along: &DMatrix<f64>, from: &mut 
     from.as_mut_slice().par_chunks_mut(4 * rows).enumerate().for_each(take);
 }
 
-/// `Wᵀ C` of one panel and `K` columns.
-struct Along<'a, const K: usize> {
-    rows: &'a [[f64; WIDTH]],
+/// `Wᵀ C` of `P` panels and `K` columns.
+struct Along<'a, const P: usize, const K: usize> {
+    rows: [&'a [[f64; WIDTH]]; P],
     c: [&'a [f64]; K],
 }
 
-impl<const K: usize> WithSimd for Along<'_, K> {
-    type Output = [[f64; WIDTH]; K];
+impl<const P: usize, const K: usize> WithSimd for Along<'_, P, K> {
+    type Output = [[[f64; WIDTH]; K]; P];
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let mut out = [[0.0; WIDTH]; K];
-        let c = self.c.map(|c| &c[..self.rows.len()]);
+        let mut out = [[[0.0; WIDTH]; K]; P];
+        let count = self.rows.first().map_or(0, |rows| rows.len());
+        let (rows, c) = (self.rows.map(|rows| &rows[..count]), self.c.map(|c| &c[..count]));
         for lane in 0..WIDTH / S::F64_LANES {
-            let mut sums = [simd.splat_f64s(0.0); K];
-            for (i, row) in self.rows.iter().enumerate() {
-                let x = S::as_simd_f64s(row).0[lane];
-                for k in 0..K {
-                    sums[k] = simd.mul_add_e_f64s(x, simd.splat_f64s(c[k][i]), sums[k]);
+            let mut sums = [[simd.splat_f64s(0.0); K]; P];
+            for i in 0..count {
+                for p in 0..P {
+                    let x = S::as_simd_f64s(&rows[p][i]).0[lane];
+                    for k in 0..K {
+                        sums[p][k] = simd.mul_add_e_f64s(x, simd.splat_f64s(c[k][i]), sums[p][k]);
+                    }
                 }
             }
-            for k in 0..K {
-                S::as_mut_simd_f64s(&mut out[k]).0[lane] = sums[k];
+            for p in 0..P {
+                for k in 0..K {
+                    S::as_mut_simd_f64s(&mut out[p][k]).0[lane] = sums[p][k];
+                }
             }
         }
         out
@@ -191,7 +220,7 @@ mod tests {
 
     #[test]
     fn products_are_those_of_plain_matrices() {
-        for (width, columns) in [(1, 1), (7, 2), (8, 3), (21, 9)] {
+        for (width, columns) in [(1, 1), (7, 2), (8, 3), (21, 9), (40, 6)] {
             let at = |i: usize, j: usize| (0.37 * (i as f64 + 1.0) * (j as f64 + 2.0)).sin();
             let (w, c) =
                 (DMatrix::from_fn(1200, width, at), DMatrix::from_fn(1200, columns, |i, j| at(j + 3, i)));

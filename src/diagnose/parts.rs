@@ -15,7 +15,7 @@ use super::rms::rms_of;
 use super::score::Rows;
 use super::search::{ENTER, Search};
 use super::shares::Shares;
-use super::terms::{ModelTerm, all_but};
+use super::terms::{Hypothesis, ModelTerm, all_but};
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Library, Place, RecordingFacts};
 use crate::feature::Dependence;
@@ -65,7 +65,7 @@ impl Unnamed {
         let mut candidates = search.candidates.to_vec();
         let first = candidates.len();
         candidates.extend(library.candidates(machine, facts).all);
-        let coarse = Coarse::new(search.rows.linear, candidates.len());
+        let coarse = Coarse::new(search.rows.linear, &candidates);
         Unnamed { library, candidates, first, coarse }
     }
 
@@ -108,29 +108,50 @@ impl Unnamed {
     }
 
     /// The parts that what was found leaves to be modelled; where there are none, the likeliest one, that can only be told. `search`: with
-    /// these candidates.
-    pub fn parts(&self, search: &Search, in_model: &[ModelTerm]) -> (Vec<ModelTerm>, Option<ModelTerm>) {
+    /// these candidates, of which those that `is_asked` tells are.
+    pub fn parts(
+        &self,
+        search: &Search,
+        in_model: &[ModelTerm],
+        is_asked: impl Fn(&usize) -> bool,
+    ) -> (Vec<ModelTerm>, Option<ModelTerm>) {
         let (mut all, first) = (in_model.to_vec(), in_model.len());
         let mut told = None;
-        // No other recording has this one's clock.
-        let mut open: Vec<usize> = (0..self.candidates.len()).filter(|c| !search.goes_by_clock(*c)).collect();
+        let is_reading = |c: &usize| self.candidates[*c].place == Place::Measurement;
+        // What a joint or a frame does is no reading's.
+        let (mut rest, mut open): (Vec<usize>, Vec<usize>) =
+            (0..self.candidates.len()).filter(is_asked).partition(is_reading);
         while all.len() - first < MOST {
             (search.progress)(&format!("modelling what has no name, part {}", all.len() - first + 1));
             let marginal = Arc::new(search.beside_names(&all));
             let hypotheses = search.compare(marginal.clone(), Some(&open));
-            let likely = hypotheses.iter().filter(|h| h.weight > ENTER).take(TRIES);
-            let mut next = None;
-            for term in likely.filter_map(|hypothesis| search.enter_bare(hypothesis, &marginal)) {
+            // What the law of a motion leaves is not the time's.
+            let is_own = |h: &&Hypothesis| {
+                !search.goes_by_clock(h.candidate) || h.score.gain > search.discrepancy_error(h, &all)
+            };
+            let (mut next, mut tries) = (None, 0);
+            for hypothesis in hypotheses.iter().filter(|h| h.weight > ENTER).filter(is_own) {
+                let Some(term) = search.enter_bare(hypothesis, &marginal) else { continue };
                 let with = [all.as_slice(), std::slice::from_ref(&term)].concat();
                 if is_foretold(search, &with, all.len()) {
                     next = Some(term);
                     break;
                 }
-                // What fails now is not asked again.
+                // What fails now is not asked again; what fails because it goes by the clock says nothing of the others.
                 open.retain(|candidate| *candidate != term.candidate);
+                tries += usize::from(!search.goes_by_clock(term.candidate));
                 told = told.or(Some(term));
+                if tries == TRIES {
+                    break;
+                }
             }
-            let Some(term) = next else { break };
+            let Some(term) = next else {
+                if rest.is_empty() {
+                    break;
+                }
+                open = std::mem::take(&mut rest);
+                continue;
+            };
             all.push(ModelTerm { initial: search.initial_of(&term), ..term });
         }
         // What came later may say what was said before.

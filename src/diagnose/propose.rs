@@ -36,17 +36,21 @@ pub(super) fn proposals(
     let rows = laws.rows(search, None);
     let search = &laws.search(search, &rows);
     let draft = Draft { search, unnamed, laws: &laws, machine };
-    let dyad = |term: &ModelTerm| search.candidates[term.candidate].place.dyad();
+    let seat = |term: &ModelTerm| search.candidates[term.candidate].place.seat();
     // A part may be a family of the library, too.
     let is_free = |term: &&ModelTerm| term.candidate >= unnamed.first;
-    let mut places: Vec<usize> = parts.iter().filter(is_free).filter_map(dyad).collect();
-    places.sort_unstable();
-    places.dedup();
+    let mut places: Vec<Place> = Vec::new();
+    for place in parts.iter().filter(is_free).map(seat) {
+        if !places.contains(&place) {
+            places.push(place);
+        }
+    }
+    places.sort_by_key(|place| place.dyad());
     let mut all: Vec<Proposal> = Vec::new();
     for place in places {
         (search.progress)("putting a law together for what has no name");
         let (free, others): (Vec<ModelTerm>, Vec<ModelTerm>) =
-            parts.iter().cloned().partition(|part| is_free(&part) && dyad(part) == Some(place));
+            parts.iter().cloned().partition(|part| is_free(&part) && seat(part) == place);
         let others = [known, &others].concat();
         let mut looks_like: Vec<LikelyName> = Vec::new();
         for name in free.iter().flat_map(names) {
@@ -67,7 +71,7 @@ pub(super) fn proposals(
             let ron = family.to_ron();
             all.push(Proposal {
                 name: family.name,
-                at: Place::Joint(place).name(machine),
+                at: place.name(machine),
                 partner: draft.partner(terms).map(|k| Place::Joint(k).name(machine)),
                 law: family.features.iter().map(Expression::to_string).collect(),
                 free: law.is_none(),
@@ -92,15 +96,14 @@ fn held_out(search: &Search, others: &[ModelTerm], terms: &[ModelTerm]) -> ByQua
 fn law(
     search: &Search,
     laws: &Unnamed,
-    place: usize,
+    place: Place,
     others: &[ModelTerm],
     free: &[ModelTerm],
 ) -> Option<Vec<ModelTerm>> {
     let free = [others, free].concat();
     let mut all = others.to_vec();
-    let mut open: Vec<usize> = (laws.first..laws.candidates.len())
-        .filter(|c| laws.candidates[*c].place.dyad() == Some(place))
-        .collect();
+    let mut open: Vec<usize> =
+        (laws.first..laws.candidates.len()).filter(|c| laws.candidates[*c].place.seat() == place).collect();
     while all.len() - others.len() < MOST_TERMS {
         let marginal = Arc::new(search.beside_names(&all));
         let hypotheses = search.compare(marginal.clone(), Some(&open));
@@ -220,19 +223,26 @@ impl Draft<'_> {
         looks_like: &[LikelyName],
     ) -> Family {
         let first = self.family_of(&terms[0]);
-        let place = self.search.candidates[terms[0].candidate].place.dyad().unwrap_or(0);
+        let place = self.search.candidates[terms[0].candidate].place.seat();
         let partner = self.partner(terms);
         let features: Vec<Expression> = terms.iter().flat_map(|term| self.features(term)).cloned().collect();
         let law = features.iter().map(Expression::to_string).collect::<Vec<_>>().join(", ");
         let turns =
             |j: usize| self.machine.dyads()[j].joint.as_ref().is_some_and(|q| q.kind == JointKind::Revolute);
-        let named = |j: usize| Place::Joint(j).name(self.machine);
-        let at = partner.map_or_else(|| named(place), |k| format!("{} and {}", named(place), named(k)));
+        let named = |place: Place| place.name(self.machine);
+        let at = partner
+            .map_or_else(|| named(place), |k| format!("{} and {}", named(place), named(Place::Joint(k))));
+        let joint = |j: usize| if turns(j) { Seat::Revolute } else { Seat::Prismatic };
+        let (seat, who) = match place {
+            Place::Joint(j) | Place::Pair(j, _) => (joint(j), "what carries {at}"),
+            Place::Frame(_) => (Seat::Frame, "frame {at}"),
+            Place::Measurement => (Seat::Measurement, "the reading"),
+        };
         let is_along = first.directions == [Directions::Along];
         // Of a pose in lengths and angles the usual size stands.
-        let size = match (is_along, turns(place)) {
-            (true, true) => Size { urad: 1e6 * self.size(others, terms), ..first.size },
-            (true, false) => Size { um: 1e6 * self.size(others, terms), ..first.size },
+        let size = match (is_along, seat) {
+            (true, Seat::Revolute) => Size { urad: 1e6 * self.size(others, terms), ..first.size },
+            (true, _) => Size { um: 1e6 * self.size(others, terms), ..first.size },
             (false, _) => first.size,
         };
         let peak = Output { name: "peak".into(), is: Meaning::Peak, unit: "travel".into(), shown: None };
@@ -243,7 +253,7 @@ impl Draft<'_> {
         Family {
             name,
             about: format!("In no book. Found at {at}: a sum of {law}, each times a number."),
-            sits: vec![if turns(place) { Seat::Revolute } else { Seat::Prismatic }],
+            sits: vec![seat],
             partner: partner.map(|k| if turns(k) { Partner::Revolute } else { Partner::Prismatic }),
             features,
             least: None,
@@ -253,7 +263,7 @@ impl Draft<'_> {
             coefficients: if is_along { vec![peak] } else { Vec::new() },
             sentence: match is_along {
                 true => format!("axis {{at}} errs by up to {{peak}}, by a law that is in no book: {law}"),
-                false => format!("what carries {{at}} errs by a law that is in no book: {law}"),
+                false => format!("{who} errs by a law that is in no book: {law}"),
             },
             cause: "not known: look at what moves as this law does".into(),
             remedy: "`kincal compensate` takes it away; measure {at} on another path before a cause is named"

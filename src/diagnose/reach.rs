@@ -1,8 +1,11 @@
 //! What an effect takes away together with what nobody knows of it: how it was before anybody looked, and its shape.
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use super::beside::Beside;
 use super::discrepancy;
+use super::equations::Equations;
 use super::evidence::log_mean_exp;
 use super::policy::Rule;
 use super::score::Field;
@@ -68,16 +71,20 @@ impl Search<'_> {
         hypothesis: &Hypothesis,
         field: &Field,
     ) -> Option<WithState> {
-        let effect = self.enter_as(candidate, hypothesis, &field.marginal).filter(|_| self.in_motion)?;
-        let answers = discrepancy::answers(self.rows, candidate, &effect);
-        let initial = discrepancy::initial_conditions(self.rows, candidate, &effect, answers).white;
-        if initial.ncols() == 0 {
+        if !self.in_motion {
             return None;
         }
-        let beside = self.rows.field(field.marginal.with(&initial));
-        let score =
-            self.rows.score_at(candidate, &hypothesis.score.parameters, &beside, self.overdispersion)?;
-        let worth = field.marginal.worth(&initial, &field.left, self.overdispersion);
+        let parameters = &hypothesis.score.parameters;
+        let white = self.rows.of(candidate, parameters)?;
+        let effect = self.enter_as(candidate, hypothesis, &white, (&field.marginal, &field.left))?;
+        let answers = discrepancy::answers(self.rows, candidate, &effect);
+        let initial = discrepancy::initial_conditions(self.rows, candidate, &effect, answers).white;
+        let both = Beside::new(&[&initial, &white], &field.marginal, &field.left).seen(1);
+        if both.count() == 0 {
+            return None;
+        }
+        let worth = both.worth(self.overdispersion);
+        let score = self.rows.score_by(candidate, parameters, &both.others().last(), self.overdispersion);
         Some(WithState {
             evidence: worth + score.at_best - hypothesis.score.at_best,
             reach: score.gain + (worth * self.overdispersion).max(0.0),
@@ -86,28 +93,36 @@ impl Search<'_> {
 
     /// The weight of a hypothesis of which as likely as not the shape departs from the family's, (66).
     pub fn with_discrepancy(&self, hypothesis: &Hypothesis, field: &Field) -> f64 {
-        let Some(effect) = self.enter(hypothesis, &field.marginal) else { return hypothesis.weight };
-        let with_initial = self.rows.field(field.marginal.with(&effect.initial));
-        let with_discrepancies = self.rows.field(with_initial.marginal.with(&effect.discrepancy));
+        self.with_shape(hypothesis, field)
+            .map_or(hypothesis.weight, |weight| log_mean_exp(&[hypothesis.weight, weight]))
+    }
+
+    /// The same where it does depart; `None` where a feature is not there.
+    fn with_shape(&self, hypothesis: &Hypothesis, field: &Field) -> Option<f64> {
         let candidate = &self.candidates[hypothesis.candidate];
-        let grown = |field: &Field| {
-            let score =
-                self.rows.score_at(candidate, &hypothesis.score.parameters, field, self.overdispersion)?;
-            Some(score.at_best - hypothesis.score.at_best)
+        let parameters = &hypothesis.score.parameters;
+        let white = self.rows.of(candidate, parameters)?;
+        let effect = self.enter_directed(hypothesis, &white, (&field.marginal, &field.left))?;
+        let answers = discrepancy::answers(self.rows, candidate, &effect);
+        let initial = match self.in_motion {
+            true => discrepancy::initial_conditions(self.rows, candidate, &effect, answers.clone()).white,
+            false => DMatrix::zeros(white.nrows(), 0),
         };
-        let (Some(by_initial), Some(by_discrepancy)) = (grown(&with_initial), grown(&with_discrepancies))
-        else {
-            return hypothesis.weight;
+        let shape = discrepancy::shape(self.rows, candidate, &effect, answers).white;
+        let all = Beside::new(&[&initial, &shape, &white], &field.marginal, &field.left).seen(2);
+        let with_initial = all.others();
+        let grown = |own: &Equations| {
+            let score = self.rows.score_by(candidate, parameters, own, self.overdispersion);
+            score.at_best - hypothesis.score.at_best
         };
-        let initial =
-            hypothesis.weight + field.marginal.worth(&effect.initial, &field.left, self.overdispersion);
-        let discrepancy = (1.0 - FOREIGN)
-            * with_initial.marginal.worth(&effect.discrepancy, &with_initial.left, self.overdispersion);
+        let (by_initial, by_discrepancy) =
+            (grown(&with_initial.last()), grown(&with_initial.others().last()));
+        let initial = hypothesis.weight + all.worth(self.overdispersion);
+        let discrepancy = (1.0 - FOREIGN) * with_initial.worth(self.overdispersion);
         // What owes more to a shape of its own than right names do owes it to something else.
-        let weight = (initial + discrepancy + by_discrepancy).min(match Rule::OwnShapeIsLimited.decides() {
+        Some((initial + discrepancy + by_discrepancy).min(match Rule::OwnShapeIsLimited.decides() {
             true => initial + by_initial + OWN * hypothesis.reach / self.overdispersion,
             false => f64::INFINITY,
-        });
-        log_mean_exp(&[hypothesis.weight, weight])
+        }))
     }
 }

@@ -16,17 +16,27 @@ use crate::variation::{Part, Slot, Term};
 /// Half of so much energy that no effect accounts for, in units of the noise's variance, sways the odds of names.
 const SWAYS: f64 = 10.0;
 
-/// The machine linearised anew where geometry and effects stand; `None` where it is as good as linear.
-///
-/// Residuals are again those without the effects, as they would be if the machine were linear: what is left where they stand, and to
-/// that what they do there. A step of Gauss and Newton from there finds them exactly, and so do their hypotheses.
+/// The machine linearised anew where geometry and effects stand.
+pub(super) struct Straightened {
+    /// Residuals are again those without the effects, as they would be if the machine were linear: what is left where they stand, and to
+    /// that what they do there. A step of Gauss and Newton from there finds them exactly, and so do their hypotheses.
+    pub linear: Linear,
+    /// What is left there, m and rad.
+    pub left: Vec<f64>,
+    /// Whether the machine is not as good as linear on the way there.
+    pub is_bent: bool,
+    /// Whether geometry explains more from there.
+    pub is_nearer: bool,
+}
+
+/// What a model leaves, as the machine is and not as it was linearised.
 pub(super) fn straightened(
     search: &Search,
     in_model: &[ModelTerm],
     machine: &Machine,
     recordings: &[Recording],
     dead_bands: &[f64],
-) -> Result<Option<Linear>> {
+) -> Result<Straightened> {
     let linear = search.rows.linear;
     let model = Model::new(search, in_model);
     let mut to = Displaced {
@@ -61,12 +71,12 @@ pub(super) fn straightened(
         beside.apply(&white).norm_squared()
     };
     let there = displaced.residual.iter().zip(&displaced.acting).map(|(all, acting)| all - acting);
-    let there: Vec<f64> = there.collect();
+    let left: Vec<f64> = there.collect();
     let expected = model.residual_without(search, in_model, moves_machine);
-    let bend: Vec<f64> = there.iter().zip(expected).map(|(a, b)| a - b).collect();
-    let bend = energy(&bend, &search.beside(in_model, None));
-    let is_nearer = energy(&there, &search.base) < energy(&linear.residual, &search.base);
-    Ok((is_nearer && bend > SWAYS).then_some(displaced))
+    let bend: Vec<f64> = left.iter().zip(expected).map(|(a, b)| a - b).collect();
+    let is_bent = energy(&bend, &search.beside(in_model, None)) > SWAYS;
+    let is_nearer = energy(&left, &search.base) < energy(&linear.residual, &search.base);
+    Ok(Straightened { linear: displaced, left, is_bent, is_nearer })
 }
 
 /// Whether it is on the machine: a delay of all readings is one of all joints.

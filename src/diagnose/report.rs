@@ -13,7 +13,7 @@ use super::held_out::Model;
 use super::marginal::Marginal;
 use super::nameless::{Proposal, Unexplained, UnnamedPart};
 use super::names::LIKELY;
-use super::noise::Noise;
+use super::noise::{self, Noise};
 use super::orders;
 use super::outliers;
 use super::parts::{Unnamed, least_foretold};
@@ -173,15 +173,10 @@ impl Findings {
         let unnamed = Unnamed::beside(search, machine, facts);
         let rows = unnamed.rows(search, memory);
         let wide = unnamed.search(search, &rows);
-        let (modelled, has_parts) = self.modelled(
-            (search, &wide, memory.is_some()),
-            &unnamed,
-            given,
-            noise,
-            (doubt, is_rest),
-            propose,
-        );
-        (modelled.diagnosis(&wide, (machine, library), noise, &self.shares), has_parts)
+        let is_anew = memory.is_some();
+        let (modelled, noise, has_parts) =
+            self.modelled((search, &wide, is_anew), &unnamed, given, noise, (doubt, is_rest), propose);
+        (modelled.diagnosis(&wide, (machine, library), &noise, &self.shares), has_parts)
     }
 
     /// The names alone.
@@ -198,7 +193,7 @@ impl Findings {
         }
     }
 
-    /// Names and parts; whether there are parts. `narrow`, `search`: without and with free functions; `is_anew`: by another noise.
+    /// Names and parts, the noise as they leave it, and whether there are parts. `narrow`, `search`: without and with free functions; `is_anew`: by another noise.
     fn modelled(
         &self,
         (narrow, search, is_anew): (&Search, &Search, bool),
@@ -207,8 +202,8 @@ impl Findings {
         noise: &[Noise],
         (doubt, is_rest): (Doubt, bool),
         propose: bool,
-    ) -> (Modelled, bool) {
-        let (machine, library, _) = given;
+    ) -> (Modelled, Vec<Noise>, bool) {
+        let (machine, library, facts) = given;
         let shares = &self.shares;
         let (mut told, mut shared_effects) = (self.told.clone(), self.shared_effects.clone());
         let beside = |term: &ModelTerm| match is_anew {
@@ -220,13 +215,21 @@ impl Findings {
         shared_effects.iter_mut().for_each(|term| *term = beside(term));
         let mut known: Vec<ModelTerm> =
             told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
-        let (modelled, only_told) = unnamed.parts(search, &known);
+        let (modelled, only_told) = unnamed.parts(search, &known, |_| true);
         let naming = unnamed.named(search, &known, modelled.clone());
         let found: Vec<ModelTerm> =
             naming.told.iter().map(|given| &given.term).chain(&naming.parts).cloned().collect();
         let all = [known.as_slice(), &found].concat();
+        // What goes to and fro from reading to reading was taken for noise.
+        let judged = noise::of(
+            search.rows.linear,
+            &residual_of(search, &all),
+            search.runs,
+            &search.rows.whitener.out,
+            facts,
+        );
         let has_parts = !modelled.is_empty()
-            && (folds::remaining(search, noise, &all, known.len()).is_some_and(|part| part <= HALF)
+            && (folds::remaining(search, &judged, &all, known.len()).is_some_and(|part| part <= HALF)
                 || !Rule::LeavesHalf.decides());
         // What helped alone may do harm beside them.
         while let Some(i) = has_parts
@@ -240,6 +243,7 @@ impl Findings {
             shared_effects.iter_mut().for_each(|term| *term = beside(term));
             known = told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
         }
+        let noise = if has_parts { judged } else { noise.to_vec() };
         let (naming, only_told) = match has_parts {
             true => (naming, Vec::new()),
             false if is_rest => (naming.withdrawn(), Vec::new()),
@@ -278,13 +282,13 @@ impl Findings {
             false => Some(doubt),
         };
         let left = if is_named { &found } else { &search.base };
-        let mut unexplained = doubt.map(|doubt| unexplained_by(search, machine, noise, &doubt, left));
+        let mut unexplained = doubt.map(|doubt| unexplained_by(search, machine, &noise, &doubt, left));
         if let Some(unexplained) = &mut unexplained {
             unexplained.take(shown_parts);
         }
         let (parts, of_parts) = if has_parts { (shown, of_parts) } else { Default::default() };
         let modelled = Modelled { told, shared_effects, of_shared, parts, of_parts, unexplained, proposals };
-        (modelled, has_parts)
+        (modelled, noise, has_parts)
     }
 }
 
@@ -318,7 +322,7 @@ impl Modelled {
             samples: linear.all_samples,
             thinned: (linear.every > 1)
                 .then_some(Thinned { every: linear.every, samples: linear.lines.len() as u64 }),
-            noise_floor: ByQuantity::of(|quantity| noise_of(search, noise, quantity == Quantity::Angle)),
+            noise_floor: ByQuantity::of(|quantity| sigma_of(search, noise, quantity == Quantity::Angle)),
             rms: ByQuantity::of(|quantity| {
                 let left = rms_of(search, &left_over, quantity == Quantity::Angle);
                 by_model(linear.fit.rms[quantity], left)
@@ -384,7 +388,7 @@ fn proved(
     let unnamed = Unnamed::beside(search, machine, facts);
     let rows = unnamed.rows(search, None);
     let search = unnamed.search(search, &rows);
-    let (parts, _) = unnamed.parts(&search, &[]);
+    let (parts, _) = unnamed.parts(&search, &[], |candidate| !search.goes_by_clock(*candidate));
     // Parts that are these names and more say nothing against them.
     let is_among = |name: &ModelTerm| parts.iter().any(|part| part.candidate == name.candidate);
     let stand = names.iter().all(is_among) || !folds::are_better(&search, &parts, &names);
@@ -403,8 +407,8 @@ fn unexplained_by(
     let (place, with) = doubt.place.map_or_else(|| whereabouts(search, machine), |place| (place, doubt.with));
     let at = place.name(machine);
     let goes_with = with.map(|joint| Place::Joint(joint).name(machine));
-    let length = noise_of(search, noise, false);
-    let sigma = length.or(noise_of(search, noise, true)).unwrap_or(1.0);
+    let length = sigma_of(search, noise, false);
+    let sigma = length.or(sigma_of(search, noise, true)).unwrap_or(1.0);
     let rms_m = sigma * (doubt.energy / search.rows.whitener.count().max(1) as f64).sqrt();
     let size = match length {
         Some(_) => format!("{:.2} um", 1e6 * rms_m),
@@ -423,7 +427,7 @@ fn unexplained_by(
 }
 
 /// Standard deviation of the noise of lengths (m) or angles (rad), where such were read.
-fn noise_of(search: &Search, noise: &[Noise], angle: bool) -> Option<f64> {
+fn sigma_of(search: &Search, noise: &[Noise], angle: bool) -> Option<f64> {
     let is_of = |run: &[usize]| run.first().is_some_and(|row| search.rows.linear.angle[*row] == angle);
     search.runs.iter().zip(noise).find(|(run, _)| is_of(run)).map(|(_, noise)| noise.sigma)
 }

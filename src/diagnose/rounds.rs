@@ -53,6 +53,16 @@ pub(super) struct Said {
     pub may_be_late: Option<usize>,
 }
 
+/// From where the machine was linearised anew.
+struct Origin {
+    linear: Linear,
+    noise: Vec<Noise>,
+    /// Candidates of what was found.
+    found: Vec<usize>,
+    /// What that leaves, as the machine is, m and rad.
+    left: Vec<f64>,
+}
+
 impl Case<'_> {
     /// Everything that these candidates say of it.
     ///
@@ -61,28 +71,26 @@ impl Case<'_> {
     pub fn told(&self, plain: &[Candidate]) -> Result<Said> {
         let Case { machine, recordings, library, facts, progress, .. } = *self;
         progress("fitting constant geometry");
-        let in_motion = facts_are_smooth(facts);
+        let in_motion = facts.are_smooth();
         let mut linear = linear(machine, recordings, self.options, &facts.dead_bands, in_motion, progress)?;
         let mut candidates = plain.to_vec();
         let runs = noise::runs(&linear);
-        let mut coarse = Coarse::new(&linear, candidates.len());
+        let mut coarse = Coarse::new(&linear, &candidates);
         let drives_of = |linear: &Linear, coarse: &Coarse| match in_motion {
             true => drives(linear, coarse, plain, library),
             false => DMatrix::zeros(linear.residual.len(), 0),
         };
         let mut give_way = drives_of(&linear, &coarse);
-        let mut out = noise::outliers(&linear, &runs, facts_are_smooth(facts));
-        if facts_are_smooth(facts) {
+        let mut out = noise::outliers(&linear, &runs, facts.are_smooth());
+        if facts.are_smooth() {
             noise::spare_reversals(&linear, &mut out);
             out.iter_mut().zip(noise::waiting(&linear)).for_each(|(out, waiting)| *out |= waiting);
         }
-        let total: f64 = candidates.iter().map(|c| c.often).sum();
-        let priors: Vec<f64> = candidates.iter().map(|c| (c.often / total).ln()).collect();
-        let commonness = commonness(&candidates);
         // What is left is noise, once everything else is modelled: the noise is judged anew from it.
-        let mut noise = noise_of(&linear, &linear.residual, &runs, &out, facts);
+        let mut noise = noise::of(&linear, &linear.residual, &runs, &out, facts);
         let mut in_model: Vec<ModelTerm> = Vec::new();
         let (mut round, mut moves, mut forgot) = (1, 0, false);
+        let mut origin: Option<Origin> = None;
         loop {
             let rows = Rows::new(
                 &linear,
@@ -95,16 +103,16 @@ impl Case<'_> {
                 runs: &runs,
                 base: rows.base(),
                 candidates: &candidates,
-                priors: priors.clone(),
-                commonness: commonness.clone(),
+                priors: priors(&candidates),
+                commonness: commonness(&candidates),
                 progress,
                 overdispersion: 1.0,
-                in_motion: facts_are_smooth(facts),
+                in_motion: facts.are_smooth(),
                 known: Mutex::default(),
                 grounds: Mutex::default(),
             };
             let judge = |in_model: &[ModelTerm]| {
-                noise_of(&linear, &report::residual_of(&search, in_model), &runs, &out, facts)
+                noise::of(&linear, &report::residual_of(&search, in_model), &runs, &out, facts)
             };
             let is_settled = |judged: &[Noise]| noise.iter().zip(judged).all(|(a, b)| a.is_close(b));
             in_model =
@@ -117,7 +125,7 @@ impl Case<'_> {
                 let off =
                     noise::outliers_again(&out, &linear, &report::residual_of(&search, &lasting), &runs);
                 if !lasting.is_empty() && off != out && Rule::OutliersAgain.decides() {
-                    noise = noise_of(&linear, &report::residual_of(&search, &in_model), &runs, &off, facts);
+                    noise = noise::of(&linear, &report::residual_of(&search, &in_model), &runs, &off, facts);
                     (out, in_model, round) = (off, lasting, round + 1);
                     continue;
                 }
@@ -131,12 +139,32 @@ impl Case<'_> {
                     may_be_late: lag::may_be_late(search, in_model).filter(|_| Rule::MayBeLate.decides()),
                 }
             };
-            if moves < MOVES && !in_model.is_empty() {
-                let moved =
+            if moves < MOVES && !in_model.is_empty() || origin.is_some() {
+                let there =
                     relinearised::straightened(&search, &in_model, machine, recordings, &facts.dead_bands)?;
-                if let Some(moved) = moved {
-                    give_way = drives_of(&moved, &coarse);
-                    (linear, noise, moves) = (moved, judged, moves + 1);
+                if there.is_bent && there.is_nearer && moves < MOVES {
+                    give_way = drives_of(&there.linear, &coarse);
+                    let linear = std::mem::replace(&mut linear, there.linear);
+                    let found = in_model.iter().map(|term| term.candidate).collect();
+                    origin = Some(Origin { linear, noise, found, left: there.left });
+                    (noise, moves) = (judged, moves + 1);
+                    continue;
+                }
+                // Far enough off, geometry bends into anything: a name that is gone where it was to stand, though it left less, was none.
+                let is_gone = |found: &usize| in_model.iter().all(|term| term.candidate != *found);
+                let energy = |left: &[f64]| search.rows.whitener.energy(left);
+                let is_astray = |origin: &mut Origin| {
+                    origin.found.iter().any(is_gone) && energy(&there.left) > energy(&origin.left)
+                };
+                if there.is_bent
+                    && let Some(origin) = origin.take_if(is_astray)
+                {
+                    let gone: Vec<usize> = origin.found.into_iter().filter(is_gone).collect();
+                    let mut rest = 0..candidates.len();
+                    candidates.retain(|_| rest.next().is_some_and(|c| !gone.contains(&c)));
+                    (linear, noise, in_model, moves) = (origin.linear, origin.noise, Vec::new(), 0);
+                    coarse = Coarse::new(&linear, &candidates);
+                    give_way = drives_of(&linear, &coarse);
                     continue;
                 }
             }
@@ -164,7 +192,7 @@ impl Case<'_> {
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
                     (candidates, moves) = (lagged, moves + 1);
-                    coarse = Coarse::new(&linear, candidates.len());
+                    coarse = Coarse::new(&linear, &candidates);
                     continue;
                 }
                 return Ok(report(&search, &in_model));
@@ -172,6 +200,12 @@ impl Case<'_> {
             (noise, round) = (judged, round + 1);
         }
     }
+}
+
+/// How likely each candidate is beforehand, as a logarithm.
+fn priors(candidates: &[Candidate]) -> Vec<f64> {
+    let total: f64 = candidates.iter().map(|c| c.often).sum();
+    candidates.iter().map(|c| (c.often / total).ln()).collect()
 }
 
 /// Families that are met more often than this part of the most frequent one are common.
@@ -182,36 +216,4 @@ const COMMON: f64 = 0.2;
 fn commonness(candidates: &[Candidate]) -> Vec<f64> {
     let most = candidates.iter().map(|c| c.often).fold(f64::MIN_POSITIVE, f64::max);
     candidates.iter().map(|c| (c.often / (COMMON * most)).min(1.0).ln()).collect()
-}
-
-fn facts_are_smooth(facts: &RecordingFacts) -> bool {
-    facts.time.is_some() && !facts.settled
-}
-
-/// Noise of every run; runs of the same quantity share theirs.
-fn noise_of(
-    linear: &Linear,
-    left: &[f64],
-    runs: &[Vec<usize>],
-    out: &[bool],
-    facts: &RecordingFacts,
-) -> Vec<Noise> {
-    let smooth = facts_are_smooth(facts);
-    let estimate = |angle: bool| {
-        let own: Vec<&Vec<usize>> =
-            runs.iter().filter(|run| run.first().is_some_and(|r| linear.angle[*r] == angle)).collect();
-        if facts.approached
-            && let Some(noise) = noise::repeated(linear, left, &own, out)
-        {
-            return noise;
-        }
-        match !smooth && facts.time.is_some() && noise::without_order(linear) {
-            true => noise::remembered(left, &own, out, linear.step(angle)),
-            false => noise::estimate(left, &own, out, smooth, linear.step(angle)),
-        }
-    };
-    let (length, angle) = (estimate(false), estimate(true));
-    runs.iter()
-        .map(|run| if run.first().is_some_and(|r| linear.angle[*r]) { angle } else { length })
-        .collect()
 }

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::cells::CellSums;
 use super::coarse::Coarse;
 use super::equations::{
-    BATCH, Best, Column, Key, ROOM, ROOM_BEYOND, Score, best, judge, key, lengths, unit_size,
+    BATCH, Best, Column, Equations, Key, ROOM, ROOM_BEYOND, Score, best, judge, key, lengths, unit_size,
 };
 use super::evidence::{log_mean_exp, rarity, sizes_up_to};
 use super::features::Features;
@@ -235,8 +235,9 @@ impl<'a> Rows<'a> {
 
     /// How many sizes beyond the usual one are usual too.
     pub(super) fn usual_sizes(&self, candidate: &Candidate, grid: &[Vec<f64>]) -> usize {
-        let unit = |at: &Vec<f64>| self.units(candidate, at).first().copied().filter(|unit| *unit > 0.0);
-        candidate.usual_to.zip(grid.first().and_then(unit)).map_or(0, |(to, unit)| sizes_up_to(to / unit))
+        let (Some(to), Some(at)) = (candidate.usual_to, grid.first()) else { return 0 };
+        let unit = self.units(candidate, at).first().copied().filter(|unit| *unit > 0.0);
+        unit.map_or(0, |unit| sizes_up_to(to / unit))
     }
 
     /// Logarithm of how rare its size is, 0 for one that is usual.
@@ -254,7 +255,7 @@ impl<'a> Rows<'a> {
         field: &Field,
         overdispersion: f64,
     ) -> Option<Score> {
-        let lengths = lengths(candidate);
+        let (i, lengths) = (self.coarse.first_alike(i), lengths(candidate));
         let all: Vec<usize> = (0..candidate.grid.len()).collect();
         let mut table: Vec<Option<Best>> = vec![None; all.len()];
         if candidate.coefficients.is_empty() {
@@ -336,6 +337,18 @@ impl<'a> Rows<'a> {
         summary(&grid, &table, &[0])
     }
 
+    /// The same from the normal equations of its columns.
+    pub fn score_by(
+        &self,
+        candidate: &Candidate,
+        parameters: &[f64],
+        equations: &Equations,
+        overdispersion: f64,
+    ) -> Score {
+        let usual = self.usual_sizes(candidate, &[parameters.to_vec()]);
+        best(candidate, parameters, &lengths(candidate), equations, overdispersion, usual).at(parameters)
+    }
+
     /// Fills the table at these points of the grid, on blocks where `kept` features are given.
     #[allow(clippy::too_many_arguments)]
     fn table(
@@ -359,11 +372,12 @@ impl<'a> Rows<'a> {
             let mut built = Vec::new();
             for i in batch {
                 let at = built.len() * k;
-                if let Some(columns) = self.of(candidate, &grid[*i]) {
+                if let Some(columns) = self.raw(candidate, &grid[*i]) {
                     joined.columns_mut(at, k).copy_from(&columns);
                     built.push(*i);
                 }
             }
+            self.whiten(&mut joined);
             judge(&joined.columns(0, k * built.len()), marginal, left, &built, &mut |i, equations| {
                 table[i] = Some(best(candidate, &grid[i], &lengths, equations, overdispersion, usual));
             });

@@ -1,9 +1,8 @@
 //! Sums of weighted sines and cosines at many frequencies at once.
 
-use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rustfft::algorithm::Radix4;
 use rustfft::algorithm::butterflies::{Butterfly12, Butterfly24};
@@ -69,10 +68,8 @@ const WIDEST: f64 = 8192.0;
 /// Frequencies to the width of a line.
 const PADDED: usize = 8;
 
-thread_local! {
-    /// The transforms so far, by length.
-    static TRANSFORMS: RefCell<HashMap<usize, Radix4<f64>>> = RefCell::new(HashMap::new());
-}
+/// The transforms so far, by length, for all threads: each is as large as what it transforms.
+static TRANSFORMS: Mutex<BTreeMap<usize, Arc<Radix4<f64>>>> = Mutex::new(BTreeMap::new());
 
 impl Band {
     fn new(x: &[f64], (from, extent): (f64, f64), weights: [&[f64]; 2], middle: f64, half: f64) -> Self {
@@ -95,9 +92,11 @@ impl Band {
             both[index] += weight * (1.0 - part);
             both[index + 1] += weight * part;
         }
-        TRANSFORMS.with_borrow_mut(|known| {
-            known.entry(length).or_insert_with(|| transform(length)).process(&mut both);
-        });
+        let transform = {
+            let mut known = TRANSFORMS.lock().unwrap_or_else(PoisonError::into_inner);
+            known.entry(length).or_insert_with(|| Arc::new(transform(length))).clone()
+        };
+        transform.process(&mut both);
         Band { middle, step: TAU / (length as f64 * cell), both, cell }
     }
 

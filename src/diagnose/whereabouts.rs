@@ -60,18 +60,28 @@ pub(super) fn standing(search: &Search, machine: &Machine, marginal: Marginal) -
         standing
     };
     let courses = courses(search, machine);
-    let all = all(search, &courses);
+    let all = all(&courses);
     let coarse = |series: &Series| {
         let level = series.level(rows);
         one(series, level).map(|standing| (standing, level.is_some()))
     };
-    let judged: Vec<Option<(Standing, bool)>> = all.par_iter().map(coarse).collect();
-    let most = judged.iter().flatten().map(|(standing, _)| standing.gain).fold(0.0, f64::max);
-    let fine = |(series, judged): (&Series, &Option<(Standing, bool)>)| {
-        let (standing, on_blocks) = (*judged)?;
-        if on_blocks && standing.gain > IN_QUESTION * most { one(series, None) } else { Some(standing) }
+    // Made anew where they are asked for twice: all together they would be larger than everything else.
+    let judged: Vec<Vec<Option<(Standing, bool)>>> =
+        all.par_iter().map(|of| of.series(search).par_iter().map(coarse).collect()).collect();
+    let most = judged.iter().flatten().flatten().map(|(standing, _)| standing.gain).fold(0.0, f64::max);
+    let in_question =
+        |(standing, on_blocks): &(Standing, bool)| *on_blocks && standing.gain > IN_QUESTION * most;
+    let fine = |(of, judged): (&Of, &Vec<Option<(Standing, bool)>>)| -> Vec<Standing> {
+        if !judged.iter().flatten().any(in_question) {
+            return judged.iter().flatten().map(|(standing, _)| *standing).collect();
+        }
+        let settled = |(series, judged): (&Series, &Option<(Standing, bool)>)| {
+            let judged = judged.as_ref()?;
+            if in_question(judged) { one(series, None) } else { Some(judged.0) }
+        };
+        of.series(search).iter().zip(judged).filter_map(settled).collect()
     };
-    let mut settled: Vec<Standing> = all.par_iter().zip(&judged).filter_map(fine).collect();
+    let mut settled: Vec<Standing> = all.par_iter().zip(&judged).flat_map_iter(fine).collect();
     settled.extend(sums(rows, &field, &courses, overdispersion));
     settled.into_iter().max_by(|a, b| a.evidence.total_cmp(&b.evidence))
 }
@@ -82,19 +92,33 @@ fn courses<'a>(search: &Search<'a>, machine: &Machine) -> Vec<Course<'a>> {
     machine.joints().filter_map(|(j, joint)| Course::of(samples, j, joint)).collect()
 }
 
+/// What series are of: one joint, one that goes with another, or the time.
+enum Of<'a> {
+    One(&'a Course<'a>),
+    Two(&'a Course<'a>, &'a Course<'a>),
+    Time,
+}
+
 /// Every series of every place.
-fn all(search: &Search, courses: &[Course]) -> Vec<Series> {
-    let mut all: Vec<Series> = courses.iter().flat_map(Course::series).collect();
-    for one in courses {
-        for other in courses.iter().filter(|other| other.joint != one.joint) {
-            let (own, others) = (one.crossing(), other.crossing());
-            let curves = own.iter().flat_map(|a| others.iter().map(|b| product(a, b))).collect();
-            let (place, motions) = (Place::Joint(one.joint), vec![one.own()]);
-            all.push(Series { place, with: Some(other.joint), motions, curves, jumps: false });
+fn all<'a>(courses: &'a [Course<'a>]) -> Vec<Of<'a>> {
+    let others = |one: &'a Course<'a>| courses.iter().filter(|other| other.joint != one.joint);
+    let pairs = courses.iter().flat_map(|one| others(one).map(move |other| Of::Two(one, other)));
+    courses.iter().map(Of::One).chain(pairs).chain([Of::Time]).collect()
+}
+
+impl Of<'_> {
+    fn series(&self, search: &Search) -> Vec<Series> {
+        match self {
+            Of::One(course) => course.series(),
+            Of::Two(one, other) => {
+                let (own, others) = (one.crossing(), other.crossing());
+                let curves = own.iter().flat_map(|a| others.iter().map(|b| product(a, b))).collect();
+                let (place, motions) = (Place::Joint(one.joint), vec![one.own()]);
+                vec![Series { place, with: Some(other.joint), motions, curves, jumps: false }]
+            }
+            Of::Time => over_time(search),
         }
     }
-    all.extend(over_time(search));
-    all
 }
 
 /// What frames and readings do over time, as candidates say that they can.

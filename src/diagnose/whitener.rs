@@ -18,11 +18,15 @@ pub(super) struct Whitener {
     unscale: Vec<f64>,
     /// Whether no row remembers another.
     is_white: bool,
+    /// Whether any row is left out.
+    leaves_out: bool,
     /// Rows that are left out.
     pub out: Vec<bool>,
 }
 
 const NONE: u32 = u32::MAX;
+/// Columns that are whitened side by side.
+pub(super) const FEW: usize = 4;
 /// Noise that remembers less than this is as good as white.
 const FORGETFUL: f64 = 0.2;
 
@@ -36,6 +40,7 @@ impl Whitener {
             scale: vec![0.0; rows],
             unscale: Vec::new(),
             is_white: true,
+            leaves_out: out.contains(&true),
             out,
         };
         for (run, noise) in runs.iter().zip(noise) {
@@ -75,23 +80,37 @@ impl Whitener {
         self.side_by_side([column], [to]);
     }
 
+    /// Sum of squares of a column of rows, whitened.
+    pub fn energy(&self, column: &[f64]) -> f64 {
+        let mut white = vec![0.0; column.len()];
+        self.apply(column, &mut white);
+        white.iter().map(|x| x * x).sum()
+    }
+
     /// Columns of rows, whitened, in place.
     pub fn apply_all(&self, columns: &mut DMatrix<f64>) {
         let rows = columns.nrows().max(1);
-        let mut white = DMatrix::zeros(columns.nrows(), columns.ncols());
-        let each = |(own, to): (&[f64], &mut [f64])| {
-            let own: Vec<&[f64]> = own.chunks(rows).collect();
-            let mut to: Vec<&mut [f64]> = to.chunks_mut(rows).collect();
-            match (&own[..], &mut to[..]) {
-                ([a, b, c, d], [to_a, to_b, to_c, to_d]) => {
-                    self.side_by_side([a, b, c, d], [to_a, to_b, to_c, to_d]);
-                }
-                (own, to) => own.iter().zip(to).for_each(|(own, to)| self.apply(own, to)),
+        columns.as_mut_slice().par_chunks_mut(FEW * rows).for_each_init(
+            || Vec::with_capacity(FEW * rows),
+            |own, to| {
+                own.clear();
+                own.extend_from_slice(to);
+                self.apply_few(own, to);
+            },
+        );
+    }
+
+    /// No more than [`FEW`] columns of rows, one behind the other.
+    pub fn apply_few(&self, columns: &[f64], to: &mut [f64]) {
+        let rows = self.scale.len().max(1);
+        let own: Vec<&[f64]> = columns.chunks(rows).collect();
+        let mut to: Vec<&mut [f64]> = to.chunks_mut(rows).collect();
+        match (&own[..], &mut to[..]) {
+            ([a, b, c, d], [to_a, to_b, to_c, to_d]) => {
+                self.side_by_side([a, b, c, d], [to_a, to_b, to_c, to_d]);
             }
-        };
-        let (own, to) = (columns.as_slice(), white.as_mut_slice());
-        own.par_chunks(4 * rows).zip(to.par_chunks_mut(4 * rows)).for_each(each);
-        *columns = white;
+            (own, to) => own.iter().zip(to).for_each(|(own, to)| self.apply(own, to)),
+        }
     }
 
     /// So many columns at once: each row waits for the one before, and others can be seen to meanwhile.
@@ -142,6 +161,21 @@ impl Whitener {
     /// Whether the noise of many rows remembers the one before.
     pub fn remembers(&self) -> bool {
         self.rho.iter().filter(|rho| **rho > FORGETFUL).count() > self.rho.len() / 10
+    }
+
+    /// Which part of the square of a column lies in rows that count.
+    pub fn part_in_use(&self, column: &[f64]) -> f64 {
+        if !self.leaves_out {
+            return 1.0;
+        }
+        let (mut used, mut all) = ([0.0; 8], [0.0; 8]);
+        for (x, out) in column.chunks(8).zip(self.out.chunks(8)) {
+            for (((used, all), x), out) in used.iter_mut().zip(&mut all).zip(x).zip(out) {
+                *used += if *out { 0.0 } else { x * x };
+                *all += x * x;
+            }
+        }
+        used.iter().sum::<f64>() / all.iter().sum::<f64>()
     }
 
     /// How many rows count.

@@ -69,6 +69,11 @@ const MOST_FOLLOWED: f64 = 8.0;
 const ALIKE: f64 = 1e-6;
 
 impl RecordingFacts {
+    /// Whether a path was followed continuously under a clock, so that neighbours see the same misfit.
+    pub(crate) fn are_smooth(&self) -> bool {
+        self.time.is_some() && !self.settled
+    }
+
     /// Reads every recording once.
     ///
     /// # Errors

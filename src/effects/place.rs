@@ -34,6 +34,14 @@ impl Place {
         }
     }
 
+    /// The same without the other joint of a pair.
+    pub(crate) fn seat(self) -> Place {
+        match self {
+            Place::Pair(j, _) => Place::Joint(j),
+            other => other,
+        }
+    }
+
     /// Name of the other joint of a pair.
     pub fn partner(self, machine: &Machine) -> Option<String> {
         match self {

@@ -136,7 +136,7 @@ fn entry(
     Entry { frame: frame.into(), moves, offset, joint, mass: None, steps: Vec::new(), note }
 }
 
-/// The convention: what is asked for, or what a comment of the table says; both must agree.
+/// The convention: what is asked for, or what a comment or a heading of the table says; both must agree.
 fn is_modified(sheet: &Sheet, form: Option<Form>) -> Result<bool> {
     let said = sheet.comments.iter().find_map(|(line, text)| {
         let text = text.to_lowercase();
@@ -147,6 +147,8 @@ fn is_modified(sheet: &Sheet, form: Option<Form>) -> Result<bool> {
             _ => None,
         }
     });
+    let of_link_before = || (!sheet.columns(&columns::BEFORE).is_empty()).then_some((sheet.line, true));
+    let said = said.or_else(of_link_before);
     let asked = form.map(|form| form == Form::Mdh);
     match (asked, said) {
         (Some(asked), Some((line, said))) if asked != said => {

@@ -245,6 +245,19 @@ impl Config<'_> {
                 }
             }
         }
+        let has = |pin: &str| {
+            let own = module.pins.iter().any(|(name, _)| *name == pin) || module.tool_pin == Some(pin);
+            own || pin == "conventional-directions"
+        };
+        for (pin, line) in self.pins.of(module.name).filter(|(pin, _)| !has(pin)) {
+            let names: Vec<&str> = module.pins.iter().map(|(name, _)| *name).collect();
+            self.told.push(format!(
+                "pin {}.{} (line {line} of a HAL file) is none of {} and is not read",
+                module.name,
+                one_line(pin),
+                names.join(", ")
+            ));
+        }
         if !unset.is_empty() {
             self.told.push(format!("no HAL file sets {} of {}: 0 is taken", unset.join(", "), module.name));
         }

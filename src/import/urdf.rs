@@ -49,7 +49,7 @@ pub(super) fn read(file: &Path, text: &str) -> Result<Robot> {
         robot.links.push(Link { name, line: source.line(node), mass, is_part: true });
     }
     for node in root.children().filter(|n| n.is_element() && n.tag_name().name() == "joint") {
-        robot.steps.push(step(&source, node, &index)?);
+        robot.steps.push(step(&source, node, &index, &mut robot.told)?);
     }
     if robot.links.is_empty() {
         return Err(source.fault(
@@ -72,7 +72,7 @@ fn required<'a>(source: &Source, node: Node<'a, '_>, name: &str) -> Result<&'a s
     })
 }
 
-fn step(source: &Source, node: Node, index: &HashMap<String, usize>) -> Result<Step> {
+fn step(source: &Source, node: Node, index: &HashMap<String, usize>, told: &mut Vec<String>) -> Result<Step> {
     let name = required(source, node, "name")?.to_string();
     let end = |which: &str| -> Result<usize> {
         let Some(element) = child(node, which) else {
@@ -87,7 +87,7 @@ fn step(source: &Source, node: Node, index: &HashMap<String, usize>) -> Result<S
     };
     let (parent, child_link) = (end("parent")?, end("child")?);
     let moves = child(node, "origin").map_or(Ok(Vec::new()), |origin| moves(source, origin))?;
-    let motion = motion(source, node, &name)?;
+    let motion = motion(source, node, &name, told)?;
     Ok(Step { name, line: source.line(node), parent, child: child_link, moves, motion })
 }
 
@@ -99,7 +99,7 @@ fn moves(source: &Source, origin: Node) -> Result<Vec<Move>> {
     Ok(Move::shifts(Vec3(xyz)).into_iter().chain(about).filter(|m| !m.is_none()).collect())
 }
 
-fn motion(source: &Source, node: Node, name: &str) -> Result<Motion> {
+fn motion(source: &Source, node: Node, name: &str, told: &mut Vec<String>) -> Result<Motion> {
     let kind = match required(source, node, "type")?.trim() {
         "fixed" => return Ok(Motion::Fixed),
         "revolute" | "continuous" => JointKind::Revolute,
@@ -127,15 +127,22 @@ fn motion(source: &Source, node: Node, name: &str) -> Result<Motion> {
     // By the largest component first: squares of the smallest numbers vanish.
     let scaled = Vec3(axis).times(1.0 / largest);
     let axis = scaled.times(1.0 / scaled.norm());
-    Ok(Motion::Moving { kind, axis, travel: travel(source, node)?, mimic: mimic(source, node)? })
+    let travel = travel(source, node, name, told)?;
+    Ok(Motion::Moving { kind, axis, travel, mimic: mimic(source, node)? })
 }
 
-/// Limits, where the file states some that are limits.
-fn travel(source: &Source, node: Node) -> Result<Option<(f64, f64)>> {
+/// Limits, where the file states some that are limits; those the wrong way round are told.
+fn travel(source: &Source, node: Node, name: &str, told: &mut Vec<String>) -> Result<Option<(f64, f64)>> {
     let limit = child(node, "limit").filter(|_| node.attribute("type") != Some("continuous"));
     let Some(limit) = limit else { return Ok(None) };
     let end = |name| Ok(source.numbers::<1>(limit, name)?.map_or(0.0, |[x]| x));
     let (lower, upper) = (end("lower")?, end("upper")?);
+    if lower > upper {
+        let line = source.line(limit);
+        told.push(format!(
+            "the lower limit of joint \"{name}\" (line {line}) is above the upper one: both are left out"
+        ));
+    }
     Ok((lower < upper && lower.abs() < 1e9 && upper.abs() < 1e9).then_some((lower, upper)))
 }
 

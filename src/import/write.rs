@@ -75,10 +75,8 @@ fn entry(entry: &Entry, units: FileUnits) -> String {
 }
 
 fn joint_text(joint: &JointEntry, units: FileUnits) -> String {
-    let (kind, unit) = match joint.kind {
-        JointKind::Prismatic => ("Prismatic", units.length),
-        JointKind::Revolute => ("Revolute", units.angle),
-    };
+    let kind = if joint.kind == JointKind::Revolute { "Revolute" } else { "Prismatic" };
+    let unit = units.of(joint.kind);
     let words = ["x", "y", "z"]
         .iter()
         .enumerate()

@@ -41,7 +41,19 @@ impl<'a> Source<'a> {
             source.put_in = (at, source.put_in.1 + declaration.len());
             source.text.insert_str(at, &declaration);
         }
+        if source.text.is_empty() {
+            let mend = "name a URDF or MJCF file, or fetch it again";
+            return Err(Error::mistake(Place::file(file), "the file is empty", mend));
+        }
         source.parse().map_err(|e| {
+            if matches!(e, XmlError::UnexpectedEndOfStream | XmlError::UnclosedRootNode) {
+                let place = source.place_of(source.text.lines().count() + before, 0);
+                return Error::mistake(
+                    place,
+                    "this is no XML: it ends too early",
+                    "the file is cut off: export or fetch it again",
+                );
+            }
             let place = source.place_of(e.pos().row as usize + before, e.pos().col as usize);
             let why = e.to_string();
             let why = why.split(" at ").next().unwrap_or_default().to_string();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::MachineFault;
 use crate::lie::{Pose, Twist, Vec3};
+use crate::units::Quantity;
 
 /// Initial pose of a frame in the one before it, and the joint that follows.
 ///
@@ -112,6 +113,16 @@ pub enum JointKind {
     Prismatic,
     /// About its axis; displacement in rad.
     Revolute,
+}
+
+impl JointKind {
+    /// What its displacement measures.
+    pub fn quantity(self) -> Quantity {
+        match self {
+            JointKind::Prismatic => Quantity::Length,
+            JointKind::Revolute => Quantity::Angle,
+        }
+    }
 }
 
 /// A joint with one degree of freedom.

@@ -392,10 +392,7 @@ pub(super) fn check_dyad(dyad: &Dyad, path: &str, units: FileUnits) -> Checked<(
         number(format!("{path}.joint.travel[1]"), to, "a limit of `travel`")?;
     }
     if let Some((from, to)) = joint.travel.filter(|(from, to)| from >= to) {
-        let unit = match joint.kind {
-            JointKind::Prismatic => units.length,
-            JointKind::Revolute => units.angle,
-        };
+        let unit = units.of(joint.kind);
         let fault = MachineFault::TravelReversed {
             joint: joint.name.clone(),
             from: unit.from_si(from),

@@ -198,10 +198,7 @@ fn dyad(dyad: &Dyad, units: FileUnits) -> DyadForm {
 }
 
 fn joint(joint: &Joint, frame: &str, units: FileUnits) -> JointForm {
-    let unit = match joint.kind {
-        JointKind::Prismatic => units.length,
-        JointKind::Revolute => units.angle,
-    };
+    let unit = units.of(joint.kind);
     let body = JointBody {
         axis: axis(joint.axis),
         name: (joint.name != frame).then(|| joint.name.clone()),

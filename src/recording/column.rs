@@ -1,7 +1,7 @@
 //! The header row: which column plays which part, in which unit.
 
 use super::RecordingFault as Fault;
-use super::entry::{example_unit, quantity_of};
+use super::entry::example_unit;
 use super::header::{Draft, Measurement, NominalLength};
 use super::text::{self, Fail};
 use crate::machine::Drive;
@@ -95,11 +95,11 @@ fn meaning(machine: &Machine, measured: Measurement, name: &str) -> Meaning {
     // A joint's name comes first: a machine may call its joints `r` and `d`.
     if let Some((dyad, joint)) = machine.joints().find(|(_, joint)| joint.name == name) {
         let command = machine.commands().iter().position(|c| c == name);
-        return Some((command.map_or(Role::Follower(dyad), Role::Command), quantity_of(joint.kind)));
+        return Some((command.map_or(Role::Follower(dyad), Role::Command), joint.kind.quantity()));
     }
     // Of the joints of a side branch the number follows.
     if let Some(joint) = machine.side_joint(name) {
-        return Some((Role::Channel(0), quantity_of(joint.kind)));
+        return Some((Role::Channel(0), joint.kind.quantity()));
     }
     if name == "t" {
         return Some((Role::Time, Quantity::Time));
@@ -124,7 +124,7 @@ fn meaning(machine: &Machine, measured: Measurement, name: &str) -> Meaning {
         Measurement::Joint { .. } => {
             let joint = name.strip_suffix("_meas")?;
             let (_, joint) = machine.joints().find(|(_, j)| j.name == joint)?;
-            Some((Role::Value(0), quantity_of(joint.kind)))
+            Some((Role::Value(0), joint.kind.quantity()))
         }
     }
 }
@@ -180,7 +180,7 @@ impl Layout {
                     return Err(Fail::at(line, column + 1, Fault::BothWays { joint }));
                 }
                 (None, None) => {
-                    let unit = example_unit(quantity_of(machine.command_joint(c).kind));
+                    let unit = example_unit(machine.command_joint(c).kind.quantity());
                     let similar = similar(&self.columns, &[name]).map(|(number, name, _)| (number, name));
                     return Err(Fail::at(line, 0, Fault::MissingJoint { joint, unit, similar }));
                 }
@@ -381,7 +381,7 @@ fn values(
                 [] => {
                     let joints: Vec<_> = machine.joints().map(|(_, j)| format!("{}_meas", j.name)).collect();
                     let (_, joint) = machine.joints().next().unzip();
-                    let unit = joint.map_or("mm", |j| example_unit(quantity_of(j.kind)));
+                    let unit = joint.map_or("mm", |j| example_unit(j.kind.quantity()));
                     let first = joints.first().map_or("x_meas", String::as_str);
                     let example = format!("after a joint: `{first}[{unit}]`");
                     let (column, fault) = lack(&joints, &example);

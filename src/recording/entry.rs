@@ -3,7 +3,6 @@
 use super::RecordingFault as Fault;
 use super::text::{self, Fail, LARGEST};
 use crate::lie::Vec3;
-use crate::machine::JointKind;
 use crate::units::{Quantity, Unit};
 
 /// One line, cut into its parts; columns in characters from 1.
@@ -155,13 +154,5 @@ pub(super) fn example_unit(quantity: Quantity) -> &'static str {
         Quantity::Current => "A",
         Quantity::Voltage => "V",
         Quantity::One => "1",
-    }
-}
-
-/// What the displacement of a joint measures.
-pub(super) fn quantity_of(kind: JointKind) -> Quantity {
-    match kind {
-        JointKind::Prismatic => Quantity::Length,
-        JointKind::Revolute => Quantity::Angle,
     }
 }

@@ -1,11 +1,12 @@
 //! The lines `# key[unit]: value` above the header row.
 
 use super::RecordingFault as Fault;
-use super::entry::{Entry, quantity_of};
+use super::entry::Entry;
 use super::text::{self, Fail};
 use crate::lie::Vec3;
 use crate::machine::Machine;
 use crate::units::Quantity;
+use crate::wording::nearly;
 
 /// What a recording says of itself, in m and rad.
 #[non_exhaustive]
@@ -268,7 +269,7 @@ impl Draft {
             let (joint, known) = (text::shown(joint.as_bytes()), machine.commands().join(", "));
             return Err(entry.at_key(Fault::UnknownJoint { joint, known }));
         };
-        let unit = entry.unit(&[quantity_of(machine.command_joint(command).kind)])?;
+        let unit = entry.unit(&[machine.command_joint(command).kind.quantity()])?;
         self.fixed[command] = Some(entry.number(entry.value, Some(unit))?);
         Ok(())
     }
@@ -278,8 +279,8 @@ impl Draft {
         let shown = text::shown(entry.key.as_bytes());
         let (first, rest) = entry.key.split_once(char::is_whitespace).unwrap_or((entry.key, ""));
         let mut words = rest.split_whitespace();
-        let fixed = words.next().is_some() && words.next().is_none() && text::nearly(first, "fixed");
-        let near = KEYS.into_iter().find(|k| text::nearly(entry.key, k));
+        let fixed = words.next().is_some() && words.next().is_none() && nearly(first, "fixed");
+        let near = KEYS.into_iter().find(|k| nearly(entry.key, k));
         if let Some(near) = near.or(fixed.then_some("fixed")) {
             return Err(entry.at_key(Fault::MisspeltKey { key: shown, near: near.into() }));
         }
@@ -309,7 +310,7 @@ fn measurement(entry: &Entry) -> Result<Measurement, Fail> {
         "displacement" => Measurement::Displacement,
         "joint" => Measurement::Joint { dyad: 0 },
         other => {
-            let near = MEASUREMENTS.into_iter().find(|m| text::nearly(other, m));
+            let near = MEASUREMENTS.into_iter().find(|m| nearly(other, m));
             let found = text::shown(other.as_bytes());
             return Err(entry.at_value(Fault::UnknownMeasurement { found, near }));
         }

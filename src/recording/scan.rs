@@ -216,7 +216,7 @@ fn warn_of_travel(recording: &Recording, ranges: &[(f64, f64)], warnings: &mut V
             continue;
         }
         let written = recording.layout.columns.iter().find(|column| column.role == Role::Command(c));
-        let example = || Unit::named(entry::example_unit(entry::quantity_of(joint.kind)));
+        let example = || Unit::named(entry::example_unit(joint.kind.quantity()));
         let Some(unit) = written.map(|column| column.unit).or_else(example) else { continue };
         let shown = |value: f64| brief(unit.from_si(value));
         warnings.push(format!(

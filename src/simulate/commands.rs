@@ -143,10 +143,7 @@ impl CommandTable {
     }
 
     fn quantity(machine: &Machine, c: usize) -> Quantity {
-        match machine.command_joint(c).kind {
-            JointKind::Prismatic => Quantity::Length,
-            JointKind::Revolute => Quantity::Angle,
-        }
+        machine.command_joint(c).kind.quantity()
     }
 
     fn fix(&mut self, machine: &Machine, line: usize, comment: &str) -> Result<()> {

@@ -52,6 +52,21 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
+fn a_program_without_a_word_of_the_machine_is_told() {
+    let told = |program: &str| {
+        let out = Bench::new("other_words", program).run(&["-o", "out.nc"]);
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        text(&out.stdout)
+    };
+    let said = told("G21 G90\nM5\nM30\n");
+    assert!(
+        said.contains("no block moves an axis of ac_table_tilting: its words are A, C, Y, X, Z"),
+        "{said}"
+    );
+    assert!(!told(PROGRAM).contains("no block moves"));
+}
+
+#[test]
 fn the_corrected_program_and_its_report_are_written() {
     let bench = Bench::new("whole", PROGRAM);
     let out = bench.run(&["-o", "out.nc", "--json", "out.json"]);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::program::{Folder, PROGRAM, done, err, out};
+use crate::program::{Folder, PROGRAM, done, err, fails, out};
 
 const LIFT: &str = "tests/exports/lift.ron";
 
@@ -49,6 +49,14 @@ fn a_file_is_printed_where_no_output_is_named() {
     assert_eq!(printed.lines().count(), 21);
     assert!(printed.starts_with("-100.000000 -100.007000 -100.001000\n"), "{printed}");
     assert_eq!(done(&["export", LIFT, "--to", "linuxcnc-comp", "--quiet", "--json", "/dev/null"]), printed);
+}
+
+#[test]
+fn what_belongs_to_one_form_alone_is_refused_beside_another() {
+    for (flag, value) in [("--axis", "z"), ("--base-file", "tests/urdf/arm.urdf")] {
+        let said = fails(1, &["export", LIFT, "--to", "dh", flag, value]);
+        assert!(said.contains(flag) && said.contains("this is --to dh"), "{said}");
+    }
 }
 
 #[test]

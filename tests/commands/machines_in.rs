@@ -55,6 +55,10 @@ fn every_file_in_machines_is_carried_by_the_program_as_it_is() {
 fn a_machine_that_does_not_come_with_the_program_is_told() {
     let said = fails(1, &["machines", "ac_tabel"]);
     assert!(said.contains("\"ac_tabel\"") && said.contains("`kincal machines` lists them"), "{said}");
+    let said = fails(1, &["machines", "scarra"]);
+    assert!(said.contains("write scara;"), "{said}");
+    let said = fails(1, &["new", "--like", "panda", "-o", "/dev/null"]);
+    assert!(said.contains("write franka_panda;"), "{said}");
 }
 
 #[test]

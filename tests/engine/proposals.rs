@@ -7,20 +7,25 @@ use kincal::effects::Library;
 use kincal::lie::Vec3;
 use kincal::recording::Recording;
 use kincal::{Chain, Machine};
+use std::f64::consts::TAU;
 
 /// Noise of the instrument, m.
 const SIGMA: f64 = 0.5e-6;
 /// Rates of a path, rad/s.
 const SEEN: [f64; 3] = [0.31, 0.23, 0.17];
 
-/// What an axis has besides its command, m: of x where it stands and how it accelerates; of z where it stands.
+/// What an axis has besides its command, m: of x where it stands and how it accelerates; of z where it stands; of the first component of the
+/// reading the time, s.
 struct Wrong {
     x: fn(f64, f64) -> f64,
     z: fn(f64) -> f64,
+    read: fn(f64) -> f64,
 }
 
-const NOTHING: Wrong = Wrong { x: |_, _| 0.0, z: |_| 0.0 };
+const NOTHING: Wrong = Wrong { x: |_, _| 0.0, z: |_| 0.0, read: |_| 0.0 };
 const YIELDS: Wrong = Wrong { x: |_, acceleration| 1e-3 * acceleration, ..NOTHING };
+const WARMS_UP: Wrong = Wrong { read: |t| 6e-6 * (1.0 - (-t / 60.0).exp()), ..NOTHING };
+const SHAKES: Wrong = Wrong { read: |t| 1.5e-6 * (TAU * 2.3 * t).sin(), ..NOTHING };
 const DENTED: Wrong = Wrong { z: |z| dent(z - 0.03), ..NOTHING };
 
 /// 8 um over some 10 mm to either side.
@@ -43,7 +48,8 @@ fn path(machine: &Machine, name: &str, wrong: &Wrong, [a, b, c]: [f64; 3]) -> Re
         let q = [slow.0 + fast.0, 0.12 * (b * t).sin(), 0.1 * (c * t).cos()];
         // The machine's order.
         let at = [q[1], q[0] + (wrong.x)(q[0], slow.1 + fast.1), q[2] + (wrong.z)(q[2])];
-        let p = chain.w_from_t(&at).transform(Vec3([0.0; 3])).0.map(|x| x + SIGMA * random.normal());
+        let mut p = chain.w_from_t(&at).transform(Vec3([0.0; 3])).0.map(|x| x + SIGMA * random.normal());
+        p[0] += (wrong.read)(t);
         let row: Vec<String> = q.iter().chain(&p).map(|x| format!("{:.6}", 1e3 * x)).collect();
         text += &format!("{t:.3},{}\n", row.join(","));
     }
@@ -51,10 +57,15 @@ fn path(machine: &Machine, name: &str, wrong: &Wrong, [a, b, c]: [f64; 3]) -> Re
 }
 
 fn without(family: &str) -> Library {
-    Library::standard().without(family).unwrap_or_else(|e| panic!("{e}"))
+    without_all(&[family])
 }
 
-/// The file of effects that is proposed, and its law; at this joint.
+fn without_all(families: &[&str]) -> Library {
+    let without = |library: Library, family: &&str| library.without(family).unwrap_or_else(|e| panic!("{e}"));
+    families.iter().fold(Library::standard(), without)
+}
+
+/// The file of effects that is proposed, and its law; at this place.
 fn proposed(
     machine: &Machine,
     recordings: &[Recording],
@@ -98,9 +109,23 @@ fn the_law_of_a_short_stretch_is_one_bump() {
 }
 
 #[test]
+fn what_goes_by_the_clock_gets_a_law_too() {
+    let machine = common::machine("xyz_mill");
+    let law = |wrong: &Wrong, families: &[&str], at: &str| {
+        let seen = [path(&machine, "seen.csv", wrong, SEEN)];
+        proposed(&machine, &seen, &without_all(families), at).expect("a law").1
+    };
+    let drifts = ["thermal_drift", "sensor_drift", "setup_slip"];
+    assert_eq!(law(&WARMS_UP, &drifts, "x"), ["1 - exp(-t/time_constant)"]);
+    // It is as large as the noise, and goes to and fro from reading to reading as that does.
+    let tone = ["sin(2π frequency t)", "cos(2π frequency t)"];
+    assert_eq!(law(&SHAKES, &["vibration"], "measurement"), tone);
+}
+
+#[test]
 fn what_names_leave_is_modelled_beside_them() {
     let machine = common::machine("xyz_mill");
-    let both = Wrong { x: YIELDS.x, z: DENTED.z };
+    let both = Wrong { x: YIELDS.x, ..DENTED };
     let seen = [path(&machine, "seen.csv", &both, SEEN)];
     // As it is seen on one path, a guideway may climb there.
     let library = without("local_defect").without("positioning_error").unwrap_or_else(|e| panic!("{e}"));

@@ -45,6 +45,12 @@ fn every_bad_machine_has_a_message_and_a_mend() {
 }
 
 #[test]
+fn a_folder_in_the_place_of_a_file_is_told_with_its_mend() {
+    let error = Machine::open(folder("machines")).expect_err("a folder");
+    assert_eq!(error.mend(), "name a file, not a folder", "{error}");
+}
+
+#[test]
 fn messages_point_at_the_token_at_fault() {
     let expected = [
         ("zero_axis", "(0, 0, 0), travel"),

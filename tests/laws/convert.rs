@@ -536,3 +536,30 @@ fn no_beginning_of_a_table_and_no_gap_in_it_makes_the_reader_panic() {
     }
     assert!(accepted > 0, "gaps in numbers leave a recording");
 }
+
+/// A slip in what is told would pass for something that was heeded.
+#[test]
+fn what_is_told_and_has_no_place_in_a_table_is_asked_about() {
+    let scara = machine("scara");
+    let table = "t_s,a1_deg,a2_deg,a3_mm,a4_deg,x_mm,y_mm,z_mm\n0,1,2,3,4,5,6,7\n1,2,3,4,5,6,7,8\n";
+    let plain = Request::default;
+    let mut said = String::new();
+    for (name, request) in [
+        ("no colon", plain().with_head("workpiece_frame unknown")),
+        ("unit of no column", plain().with_unit("ball_x", "mm")),
+        ("no such measurement", plain().with_measurement("points")),
+        ("no markers", plain().with_marker("ball")),
+        ("joint of a laser", plain().with_joint("q1")),
+        ("approach of a laser", plain().with_approach("rising")),
+        ("sense of a deviation", plain().with_deviation("ball-minus-tool")),
+        ("axes of an R-test", plain().with_axes("tool")),
+    ] {
+        let error = converted(table, &scara, &request).expect_err(name);
+        said.push_str(&format!("{name}\n  {error}\n  = {}\n", error.mend()));
+    }
+    insta::assert_snapshot!(said);
+    let idle = plain().with_euler("rpy").with_matrix("row-major").with_rotation_vector(true);
+    let told = converted(table, &scara, &idle).expect("a recording").told;
+    assert_eq!(told.iter().filter(|line| line.contains("changes nothing")).count(), 3, "{told:?}");
+    assert!(converted(table, &scara, &plain()).expect("a recording").told.len() + 3 == told.len());
+}

@@ -6,8 +6,8 @@ use kincal::lie::Vec3;
 use kincal::recording::Recording;
 use kincal::sensor::Sensor;
 use kincal::simulate::{
-    Balls, Course, Figure, Instrument, Leg, Pace, Plant, Pointing, Rounding, Sense, Turning, Turns, noise_of,
-    plane_of_axes, random_deviations, rest, usual_range,
+    Balls, Course, Faults, Figure, Instrument, Leg, Pace, Plant, Pointing, Rounding, Sense, Turning, Turns,
+    noise_of, plane_of_axes, random_deviations, rest, usual_range,
 };
 use kincal::{CalibratedMachine, Machine};
 
@@ -150,6 +150,31 @@ fn readings_without_positions_give_the_parameters_that_they_give_with_them() {
         };
         let (own, expected) = (off(&own), off(&expected));
         assert!(own < expected + 2.0 * a.hides_m, "{test}: {own:e} {expected:e}, {a:?}");
+    }
+}
+
+/// A drive with play stands until it is through the gap, which takes a while where it turns round slowly: taken for a later path, that would
+/// shift all of it, and no uncertainty would tell.
+#[test]
+fn play_does_not_shift_the_path() {
+    let machine = common::machine("xyz_mill");
+    let (rate, before, both) = (101.0, 200, [Sense::Positive, Sense::Negative]);
+    let play = "Faults(units: (length: um, angle: arcsec), backlash: [(joint: \"x\", width: 8)])";
+    let play = Faults::parse("play.ron", play, &machine).expect("faults");
+    for seed in [1, 2, 3] {
+        let truth = CalibratedMachine::nominal(machine.clone())
+            .with_deviations(random_deviations(&machine, 1.0, seed));
+        let plant = Plant::new(&truth).with_faults(&play);
+        let (_, d) = readings(&plant, &course(&machine, "circle", &both, rate), seed);
+        let table = ballbar(&d, before, 200, seed);
+        let path = nominal(&machine, "circle", &both);
+        let found = converted(&table, &machine, path, Some(rate)).expect("a recording");
+        let a = found.alignment.expect("a path was told");
+        let off = [a.start_s - before as f64 / rate, a.end_s - (before + d.len() - 1) as f64 / rate];
+        for (off, error) in off.into_iter().zip([a.start_error_s, a.end_error_s]) {
+            assert!(off.abs() < 4.0 * error, "{off:.5} s off, {a:?}");
+        }
+        assert!(a.left_m < 1.05 * NOISE, "{a:?}");
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::common::folder::Folder;
 use kincal::Chain;
 use kincal::import::{Ends, open, read};
 use nalgebra::{Isometry3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -121,4 +122,33 @@ fn no_beginning_of_a_file_and_no_gap_in_it_makes_the_reader_panic() {
     }
     // All but the text whose last line break alone is missing.
     assert_eq!(refused, text.len() - 1);
+}
+
+#[test]
+fn limits_the_wrong_way_round_are_told_and_left_out() {
+    let text = std::fs::read_to_string(arm()).expect("a file");
+    let limit = |lower: &str, upper: &str| {
+        let own = "<limit lower=\"0\" upper=\"1\" effort=\"1\" velocity=\"1\"/>";
+        let robot = format!(
+            "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"prismatic\"><parent link=\"a\"/><child link=\"b\"/>{own}</joint></robot>"
+        );
+        let robot = robot.replace("lower=\"0\" upper=\"1\"", &format!("lower=\"{lower}\" upper=\"{upper}\""));
+        read("r.urdf", &robot, &Ends::default()).expect("a machine")
+    };
+    let is_told = |told: &[String]| told.iter().any(|line| line.contains("above the upper one"));
+    assert!(is_told(&limit("0.5", "-0.5").told));
+    assert!(!is_told(&limit("-0.5", "0.5").told) && !is_told(&limit("0", "0").told));
+    assert!(!is_told(&read("arm.urdf", &text, &Ends::default().with_tip("finger")).expect("an arm").told));
+}
+
+#[test]
+fn a_description_is_read_whatever_its_encoding() {
+    let folder = Folder::new("encodings");
+    let text = std::fs::read_to_string(arm()).expect("a file");
+    let ends = Ends::default().with_tip("finger");
+    let plain = read("arm.urdf", &text, &ends).expect("an arm").machine;
+    let wide: Vec<u8> = [0xfeff].into_iter().chain(text.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    let file = folder.path("wide.urdf");
+    std::fs::write(&file, wide).expect("written");
+    assert_eq!(open(&file, &ends).expect("an arm").machine, plain);
 }

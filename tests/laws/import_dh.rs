@@ -100,3 +100,22 @@ fn no_beginning_of_a_table_and_no_gap_in_it_makes_the_reader_panic() {
         }
     }
 }
+
+#[test]
+fn headings_as_textbooks_have_them_are_understood() {
+    let rows = "1,-90,0,330,theta1\n2,0,440,0,theta2-90\n";
+    let plain = format!("joint,alpha[deg],a[mm],d[mm],theta[deg]\n{rows}");
+    let of_joint = format!("i,alpha_i (deg),a_i (mm),d_i (mm),theta_i (deg)\n{rows}");
+    let before = format!("i,alpha_{{i-1}} (deg),a_{{i-1}} (mm),d_i (mm),theta_i (deg)\n{rows}");
+    let mut as_mdh = ImportOptions::default();
+    as_mdh.form = Some(Form::Mdh);
+    let machine =
+        |text: &str, options: &ImportOptions| read_with("arm.csv", text, options).expect("a table").machine;
+    for options in [as_dh(), as_mdh.clone()] {
+        assert_eq!(machine(&of_joint, &options), machine(&plain, &options));
+    }
+    // Parameters of the link before the joint are those of the modified convention.
+    assert_eq!(machine(&before, &ImportOptions::default()), machine(&plain, &as_mdh));
+    let error = read_with("arm.csv", &before, &as_dh()).expect_err("standard");
+    assert!(error.to_string().contains("--mdh") && error.mend().contains("--mdh"), "{error}");
+}

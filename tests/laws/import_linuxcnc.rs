@@ -374,6 +374,14 @@ fn pins_that_are_not_known_are_told_with_their_mend() {
 }
 
 #[test]
+fn a_pin_that_the_module_lacks_is_told() {
+    let told = |pins: &[(&str, f64)]| with("xyzac-trt-kins", pins).expect("a machine").told.join("\n");
+    let misspelt = told(&[("y-offst", 20.0)]);
+    assert!(misspelt.contains("xyzac-trt-kins.y-offst") && misspelt.contains("z-rot-point"), "{misspelt}");
+    assert!(!told(&[("y-offset", 20.0), ("tool-offset", 10.0)]).contains("is not read"));
+}
+
+#[test]
 fn a_signal_that_is_set_sets_its_pins() {
     let text = "[KINS]\nKINEMATICS = maxkins\n[TRAJ]\nLINEAR_UNITS = inch\nCOORDINATES = X Y Z B C\n";
     let mut options = ImportOptions::default();

@@ -26,6 +26,15 @@ for axis in a c; do
 done
 for plane in x,y y,z z,x; do measure --test circle --plane $plane; done
 cp trace.csv "$here/ballbar_trace.csv"
+
+# The same bar's own file, of a program with a circle in both senses: readings alone, 50 a second. The first motion brings the bar there.
+kincal simulate truth.ron --test program --input "$here/ballbar.nc" --hold x=100mm --measure distance --length 100mm --rate 50 \
+    --faults faults.ron --noise 0.4um --seed 10 -o bar.csv --quiet
+{
+    printf 'Ballbar 100 mm, XY, 2000 mm/min, 50 Hz\nDeviation (um)\n'
+    grep -v '^#' bar.csv | awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) { name = $i; sub(/\[.*/, "", name); at[name] = i } next }
+        { printf "%.2f\n", 1000 * $at["d"] }'
+} > "$here/ballbar.csv"
 # What `metrologist.sh` has to find.
 kincal export truth.ron --to siemens --tool-length 120mm | grep 'TC_CARR15'
 

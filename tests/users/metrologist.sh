@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# You measure machines. You have a trace of the control with the ballbar on an analogue input: nine tests, one after the other, and the
-# name of the machine. You get a report, and numbers that can be entered. `kincal` is on the path.
+# You measure machines. You have the file of a ballbar with the NC program that ran, a trace of the control with the ballbar on an analogue
+# input (nine tests, one after the other), and the name of the machine. You get a report, and numbers that can be entered. `kincal` is on the
+# path.
 #
-# Positions beside the readings are better than a path that is aligned to them (`kincal convert --path`). Where bar and control write apart,
-# start both by one trigger and paste the columns side by side first.
+# The bar's own file has readings alone: the program says where the axes were, and the file is laid beside it. Positions beside the readings,
+# as the trace has them, are better.
 set -euo pipefail
 data=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 work=$(mktemp -d)
@@ -15,8 +16,10 @@ for test in 1 2 3 4 5 6 7 8 9; do
     kincal convert "$data/ballbar_trace.csv" --machine machine.ron --where Test=$test --column 'd=AI 1' --unit 'AI 1=um' \
         --measurement distance --head 'nominal_length[mm]: 100' --quiet -o "test_$test.csv"
 done
-kincal calibrate machine.ron test_?.csv --quiet --json geometry.json
-kincal diagnose machine.ron test_?.csv --report report.html -o calibrated.ron --quiet --json found.json
+kincal convert "$data/ballbar.csv" --machine machine.ron --sample-rate 50Hz \
+    --path "$data/ballbar.nc --length 100mm --without-approach" --quiet --json aligned.json -o circle.csv
+kincal calibrate machine.ron circle.csv test_?.csv --quiet --json geometry.json
+kincal diagnose machine.ron circle.csv test_?.csv --report report.html -o calibrated.ron --quiet --json found.json
 for control in siemens heidenhain fanuc iso230; do
     kincal export calibrated.ron --to $control --tool-length 120mm --quiet -o $control.txt
 done
@@ -24,6 +27,8 @@ done
 # What there has to be. The machine is 0.1 mm off, the bar reads to 0.4 um, and the play of A is 14 arcsec.
 holds() { awk "BEGIN { exit !($1) }" || { echo "$0: $2" >&2; exit 1; }; }
 of() { awk -F'[:,]' -v key="\"$1\"" '$1 ~ key { print $2 + 0; exit }' "$2"; }
+# The first motion of the program is two seconds behind the first reading.
+holds "$(of start_s aligned.json) > 1.99 && $(of start_s aligned.json) < 2.01 && $(of hides_m aligned.json) < 0.2e-6" "the program is not where it ran"
 holds "$(of geometric geometry.json) < 1.5e-6 && $(of nominal geometry.json) > 50e-6" "the geometry is not found"
 holds "$(of final found.json) < 0.5e-6" "something is left over"
 grep -q 'axis a has 1[34].* arcsec of play' found.json || { echo "$0: the play of A is not named" >&2; exit 1; }

@@ -87,7 +87,7 @@ impl Asked<'_> {
             .answer(&format!("  a point of its axis, {unit} [as the joint before]"), |text| {
                 point(text, unit)
             })?;
-        let unit = if kind == JointKind::Revolute { sketch.units.angle } else { unit };
+        let unit = sketch.units.of(kind);
         joint.travel =
             self.answer(&format!("  lower and upper limit, {unit} [none]"), |text| limits(text, unit))?;
         Ok(Some(joint))

@@ -253,9 +253,11 @@ pub(super) fn about_unexplained(unexplained: &Unexplained) -> Vec<String> {
 
 /// Which measurement shows more of a structure without a name.
 pub(super) fn next_test(unexplained: &Unexplained) -> String {
-    match unexplained.at.as_str() {
-        "measurement" => "the same path once more, and a stretch at rest".into(),
-        at => {
+    let at = unexplained.at.as_str();
+    let goes_by_time = |part: &UnnamedPart| part.at == at && part.depends_on == ["time"];
+    match at == "measurement" || unexplained.parts.iter().any(goes_by_time) {
+        true => "the same path once more, and a stretch at rest".into(),
+        false => {
             format!("a path on which {at} moves on its own, slowly, to and fro over all of its travel, twice")
         }
     }

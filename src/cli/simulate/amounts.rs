@@ -41,7 +41,7 @@ pub(crate) fn part(text: &str) -> Result<f64, String> {
 pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value > 0.0 && value <= 1e9 => Ok(value),
-        _ => Err("write a number above zero".into()),
+        _ => Err("write a number above zero, 1e9 at most".into()),
     }
 }
 

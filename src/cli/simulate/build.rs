@@ -193,10 +193,7 @@ fn held(args: &Args, machine: &Machine) -> Outcome<Vec<f64>> {
                 format!("joints of this machine: {known}"),
             ));
         };
-        let quantity = match machine.command_joint(c).kind {
-            JointKind::Prismatic => Quantity::Length,
-            JointKind::Revolute => Quantity::Angle,
-        };
+        let quantity = machine.command_joint(c).kind.quantity();
         let told =
             |what: String| usage(format!("`--hold {}`: {what}", held.joint), "write JOINT=AMOUNT, c=30deg");
         q[c] = amount(&held.amount, quantity).map_err(told)?;

@@ -24,17 +24,47 @@ pub(super) struct Columns {
     displacement: Option<usize>,
 }
 
+/// Names that the modified convention alone has: of the link before the joint.
+pub(super) const BEFORE: [&str; 10] = [
+    "a_i-1",
+    "a_{i-1}",
+    "ai-1",
+    "a(i-1)",
+    "alpha_i-1",
+    "alpha_{i-1}",
+    "alphai-1",
+    "alpha(i-1)",
+    "\u{3b1}_i-1",
+    "\u{3b1}_{i-1}",
+];
+
 /// Every name that a column may have, for the message that one has another.
 const KNOWN: &str = "joint, kind, theta, d, a, alpha, beta, offset, lower, upper, sign, displacement";
 
 const NAMES: [(&[&str], usize); 12] = [
     (&["joint", "name", "joint name", "joint_name", "link", "i", "axis"], 0),
     (&["kind", "type", "joint type", "joint_type"], 1),
-    (&["theta", "th", "\u{3b8}"], 2),
-    (&["d"], 3),
-    (&["a", "r"], 4),
-    (&["alpha", "\u{3b1}"], 5),
-    (&["beta", "\u{3b2}"], 6),
+    (&["theta", "th", "\u{3b8}", "theta_i", "thetai", "\u{3b8}_i", "\u{3b8}i"], 2),
+    (&["d", "d_i", "di"], 3),
+    (&["a", "r", "a_i", "ai", "r_i", "ri", BEFORE[0], BEFORE[1], BEFORE[2], BEFORE[3]], 4),
+    (
+        &[
+            "alpha",
+            "\u{3b1}",
+            "alpha_i",
+            "alphai",
+            "\u{3b1}_i",
+            "\u{3b1}i",
+            BEFORE[4],
+            BEFORE[5],
+            BEFORE[6],
+            BEFORE[7],
+            BEFORE[8],
+            BEFORE[9],
+        ],
+        5,
+    ),
+    (&["beta", "\u{3b2}", "beta_i", "betai"], 6),
     (&["offset"], 7),
     (&["lower", "min", "from", "lower limit", "qmin", "q_min"], 8),
     (&["upper", "max", "to", "upper limit", "qmax", "q_max"], 9),

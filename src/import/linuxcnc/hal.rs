@@ -82,6 +82,12 @@ impl Pins {
         })
     }
 
+    /// Pins of a module that are set, by their names without the module's, with the line.
+    pub fn of(&self, module: &str) -> impl Iterator<Item = (&str, usize)> {
+        let begins = format!("{module}.");
+        self.set.iter().filter_map(move |(pin, set)| Some((pin.strip_prefix(&begins)?, set.line)))
+    }
+
     /// Whether a signal drives a pin.
     pub fn is_driven(&self, pin: &str) -> bool {
         self.driven.contains_key(pin)
