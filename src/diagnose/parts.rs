@@ -13,7 +13,7 @@ use super::nameless::UnnamedPart;
 use super::noise::Noise;
 use super::rms::rms_of;
 use super::score::Rows;
-use super::search::{ENTER, Search};
+use super::search::{ENTER, Search, priors};
 use super::shares::Shares;
 use super::terms::{Hypothesis, ModelTerm, all_but};
 use super::whitener::Whitener;
@@ -89,7 +89,6 @@ impl Unnamed {
 
     /// The search with these candidates.
     pub fn search<'a>(&'a self, search: &Search<'a>, rows: &'a Rows<'a>) -> Search<'a> {
-        let total: f64 = self.candidates.iter().map(|c| c.often).sum();
         let mut commonness = search.commonness.clone();
         commonness.resize(self.candidates.len(), 0.0);
         Search {
@@ -97,7 +96,7 @@ impl Unnamed {
             runs: search.runs,
             base: rows.base(),
             candidates: &self.candidates,
-            priors: self.candidates.iter().map(|c| (c.often / total).ln()).collect(),
+            priors: priors(&self.candidates),
             commonness,
             progress: search.progress,
             overdispersion: search.overdispersion,

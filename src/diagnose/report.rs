@@ -193,7 +193,8 @@ impl Findings {
         }
     }
 
-    /// Names and parts, the noise as they leave it, and whether there are parts. `narrow`, `search`: without and with free functions; `is_anew`: by another noise.
+    /// Names and parts, the noise as they leave it, and whether there are parts. `narrow`, `search`: without and with free functions;
+    /// `is_anew`: by another noise.
     fn modelled(
         &self,
         (narrow, search, is_anew): (&Search, &Search, bool),

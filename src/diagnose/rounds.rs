@@ -15,7 +15,7 @@ use super::policy::Rule;
 use super::relinearised;
 use super::report;
 use super::score::Rows;
-use super::search::{Search, Tell};
+use super::search::{Search, Tell, priors};
 use super::speeds::less_rare;
 use super::terms::ModelTerm;
 use super::whitener::Whitener;
@@ -191,7 +191,7 @@ impl Case<'_> {
                 if moves < MOVES
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
-                    (candidates, moves) = (lagged, moves + 1);
+                    (candidates, moves, origin) = (lagged, moves + 1, None);
                     coarse = Coarse::new(&linear, &candidates);
                     continue;
                 }
@@ -200,12 +200,6 @@ impl Case<'_> {
             (noise, round) = (judged, round + 1);
         }
     }
-}
-
-/// How likely each candidate is beforehand, as a logarithm.
-fn priors(candidates: &[Candidate]) -> Vec<f64> {
-    let total: f64 = candidates.iter().map(|c| c.often).sum();
-    candidates.iter().map(|c| (c.often / total).ln()).collect()
 }
 
 /// Families that are met more often than this part of the most frequent one are common.

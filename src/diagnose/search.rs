@@ -55,6 +55,12 @@ const MOST_IN_MOTION: usize = 5;
 /// Logarithm of the odds at which an effect is taken in.
 pub(super) const ENTER: f64 = 8.0;
 
+/// How likely each candidate is beforehand, as a logarithm.
+pub(super) fn priors(candidates: &[Candidate]) -> Vec<f64> {
+    let total: f64 = candidates.iter().map(|c| c.often).sum();
+    candidates.iter().map(|c| (c.often / total).ln()).collect()
+}
+
 impl Search<'_> {
     /// A hypothesis where chance is larger than what it was searched with.
     pub fn tempered(&self, hypothesis: &Hypothesis, overdispersion: f64) -> Hypothesis {

@@ -154,7 +154,7 @@ fn readings_without_positions_give_the_parameters_that_they_give_with_them() {
 }
 
 /// A drive with play stands until it is through the gap, which takes a while where it turns round slowly: taken for a later path, that would
-/// shift all of it, and no uncertainty would tell.
+/// shift all of it.
 #[test]
 fn play_does_not_shift_the_path() {
     let machine = common::machine("xyz_mill");
@@ -171,9 +171,8 @@ fn play_does_not_shift_the_path() {
         let found = converted(&table, &machine, path, Some(rate)).expect("a recording");
         let a = found.alignment.expect("a path was told");
         let off = [a.start_s - before as f64 / rate, a.end_s - (before + d.len() - 1) as f64 / rate];
-        for (off, error) in off.into_iter().zip([a.start_error_s, a.end_error_s]) {
-            assert!(off.abs() < 4.0 * error, "{off:.5} s off, {a:?}");
-        }
+        // Half a reading; what the alignment says of its errors does not know how wide the play is.
+        assert!(off.iter().all(|off| off.abs() < 0.5 / rate), "{off:?} s off, {a:?}");
         assert!(a.left_m < 1.05 * NOISE, "{a:?}");
     }
 }
