@@ -131,6 +131,10 @@ impl WithSimd for Walk<'_> {
         let mut moved = vec![Moved::none(none); self.path.joint_count().max(1)];
         let mut velocities = vec![Twist::zero(none); self.path.joint_count()];
         let mut by_command = vec![Twist::zero(none); q.len()];
+        // Lanes that lie across two lines of the cache are written at half the speed or less: behind the first they begin where lines do,
+        // if all columns can.
+        let to_line = results.as_ptr().align_offset(size_of::<S::f64s>());
+        let second = if to_line > 0 && samples % S::F64_LANES == 0 { to_line } else { S::F64_LANES };
         let mut from = 0;
         while from < samples {
             // The last samples are those of full lanes, some of them once more.
@@ -166,7 +170,7 @@ impl WithSimd for Walk<'_> {
                     }
                 }
             }
-            from += S::F64_LANES;
+            from = if from == 0 { second } else { from + S::F64_LANES };
         }
     }
 }
@@ -193,7 +197,7 @@ impl Columns<'_> {
 impl<S: Simd> Row<Lanes<S>> for Columns<'_> {
     /// Behind the distance.
     #[inline(always)]
-    fn take(&mut self, dyad: usize, six: [Lanes<S>; 6]) {
-        self.put(1 + 6 * dyad, six);
+    fn take<const N: usize>(&mut self, first: usize, numbers: [Lanes<S>; N]) {
+        self.put(1 + first, numbers);
     }
 }

@@ -13,6 +13,8 @@ use crate::scalar::{Lanes, MOST_LANES, Scalar};
 
 use super::Chain;
 
+mod features;
+
 /// What has to be known of a machine's constants to walk along it, many times.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
@@ -34,9 +36,17 @@ struct Joint {
 struct Span {
     rotation: Mat3<f64>,
     shift: Vec3<f64>,
-    /// Number of the joint, and where one metre of it leads.
-    slides: Vec<(usize, Vec3<f64>)>,
+    slides: Vec<Slide>,
     turn: Option<Turn>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Slide {
+    joint: usize,
+    /// Where one metre of it leads.
+    way: Vec3<f64>,
+    /// Two unit vectors square to that and to each other.
+    across: [Vec3<f64>; 2],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -75,16 +85,22 @@ pub(crate) struct Moved<T> {
     second: T,
 }
 
-/// Where the numbers of a row go, six for each dyad.
+/// Where the numbers of a row go, six for each dyad, or its features.
 pub(crate) trait Row<T> {
-    /// Those of one dyad.
-    fn take(&mut self, dyad: usize, six: [T; 6]);
+    /// Neighbouring numbers, `first` the place of the first.
+    fn take<const N: usize>(&mut self, first: usize, numbers: [T; N]);
+
+    /// The wrench that goes on behind a turn; another one where it is asked what that would do.
+    #[inline(always)]
+    fn behind_turn(&mut self, y: Wrench<T>) -> Wrench<T> {
+        y
+    }
 }
 
 impl<T: Copy> Row<T> for [T] {
     #[inline(always)]
-    fn take(&mut self, dyad: usize, six: [T; 6]) {
-        self[6 * dyad..6 * dyad + 6].copy_from_slice(&six);
+    fn take<const N: usize>(&mut self, first: usize, numbers: [T; N]) {
+        self[first..first + N].copy_from_slice(&numbers);
     }
 }
 
@@ -118,7 +134,8 @@ impl Path {
                     path.spans.push(std::mem::replace(&mut open, Span::new(aligned.inverse())));
                 } else {
                     let way = open.rotation * axis.vector();
-                    open.slides.push((number, if back { -way } else { way }));
+                    let way = if back { -way } else { way };
+                    open.slides.push(Slide { joint: number, way, across: way.across() });
                 }
             }
             if !on_tool {
@@ -225,7 +242,7 @@ impl Path {
         let [x, y, z] = Mat3::identity(like).0;
         let (mut here, mut p_w) = ([Vec3(x), Vec3(y), Vec3(z)], Vec3::zero(like));
         for span in &self.spans {
-            for (joint, way) in &span.slides {
+            for Slide { joint, way, .. } in &span.slides {
                 velocities[*joint] = Twist::new(along(here, way.lift(like)), Vec3::zero(like));
             }
             p_w = p_w + along(here, span.shifted(moved));
@@ -260,7 +277,7 @@ impl Path {
         let [x, y, z] = Mat3::identity(like).0;
         let (mut here, mut p_w) = ([Vec3(x), Vec3(y), Vec3(z)], Vec3::zero(like));
         for span in &self.spans {
-            for (joint, way) in &span.slides {
+            for Slide { joint, way, .. } in &span.slides {
                 let way_w = along(here, way.lift(like));
                 for (command, factor) in &self.joints[*joint].terms {
                     speeds[*command] = speeds[*command] + way_w.times(like.lift(*factor));
@@ -302,14 +319,14 @@ impl Path {
         for step in &self.steps {
             if step.on_tool {
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
-                row.take(step.dyad, y.to_array());
-                y = self.through(step, y, moved);
+                row.take(6 * step.dyad, y.to_array());
+                y = self.through(step, y, moved, row);
                 y = step.behind(y);
             } else {
                 y = step.behind(y);
-                y = self.through(step, y, moved);
+                y = self.through(step, y, moved, row);
                 let against = Wrench { f: -y.f, m: -y.m };
-                row.take(step.dyad, against.to_array());
+                row.take(6 * step.dyad, against.to_array());
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
             }
         }
@@ -320,10 +337,17 @@ impl Path {
 impl Path {
     /// A wrench in front of a dyad's joint on the way, as it is seen behind it.
     #[inline(always)]
-    fn through<T: Scalar>(&self, step: &Step, y: Wrench<T>, moved: &[Moved<T>]) -> Wrench<T> {
+    fn through<T: Scalar>(
+        &self,
+        step: &Step,
+        y: Wrench<T>,
+        moved: &[Moved<T>],
+        row: &mut (impl Row<T> + ?Sized),
+    ) -> Wrench<T> {
         let Some((joint, axis)) = step.joint else { return y };
         let (is_turn, moved) = (self.joints[joint].is_turn, moved[joint]);
-        axis.carry(y, if step.on_tool { moved } else { moved.back(is_turn) }, is_turn)
+        let y = axis.carry(y, if step.on_tool { moved } else { moved.back(is_turn) }, is_turn);
+        if is_turn { row.behind_turn(y) } else { y }
     }
 }
 
@@ -387,7 +411,7 @@ impl Span {
     #[inline(always)]
     fn shifted<T: Scalar>(&self, moved: &[Moved<T>]) -> Vec3<T> {
         let mut shift = self.shift.lift(moved[0].first);
-        for (joint, way) in &self.slides {
+        for Slide { joint, way, .. } in &self.slides {
             let (s, Vec3([x, y, z])) = (moved[*joint].first, shift);
             let way = way.lift(s).0;
             shift = Vec3([s.mul_add(way[0], x), s.mul_add(way[1], y), s.mul_add(way[2], z)]);
@@ -403,6 +427,12 @@ impl Turn {
         let sine = if self.back { -sine } else { sine };
         let [x, y, z] = v.0;
         Vec3([cosine.mul_add(x, -(sine * y)), sine.mul_add(x, cosine * y), z])
+    }
+
+    /// What [`Turn::apply`] has done, undone.
+    #[inline(always)]
+    fn undo<T: Scalar>(self, v: Vec3<T>, moved: &[Moved<T>]) -> Vec3<T> {
+        Turn { back: !self.back, ..self }.apply(v, moved)
     }
 }
 
