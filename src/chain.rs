@@ -180,7 +180,10 @@ impl<S: Scalar> Link<S> {
             None => b_from_frame,
             Some((kind, axis, drive)) => moved(b_from_frame, *kind, *axis, displacement(drive, q)),
         };
-        self.carried.map_or(behind, |carried| behind * carried)
+        match &self.carried {
+            Some(carried) => behind * *carried,
+            None => behind,
+        }
     }
 }
 

@@ -14,11 +14,14 @@ use crate::scalar::{Lanes, MOST_LANES, Scalar};
 use super::Chain;
 
 mod features;
+mod one;
 
 /// What has to be known of a machine's constants to walk along it, many times.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
     joints: Vec<Joint>,
+    /// By command the joints that it moves, and by what factor.
+    driven: Vec<Vec<(usize, f64)>>,
     spans: Vec<Span>,
     steps: Vec<Step>,
 }
@@ -108,7 +111,7 @@ impl Path {
     /// The way through a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
         let workpiece = chain.workpiece_count;
-        let mut path = Path { joints: Vec::new(), spans: Vec::new(), steps: Vec::new() };
+        let mut path = Path { joints: Vec::new(), driven: Vec::new(), spans: Vec::new(), steps: Vec::new() };
         let mut open = Span::new(Pose::identity(0.0));
         for j in (0..workpiece).rev().chain(workpiece..chain.links.len()) {
             let (link, on_tool) = (&chain.links[j], j >= workpiece);
@@ -146,6 +149,12 @@ impl Path {
             path.steps.push(Step { dyad: j, on_tool, here_from_next, joint, carried });
         }
         path.spans.push(open);
+        for (number, joint) in path.joints.iter().enumerate() {
+            for (command, factor) in &joint.terms {
+                path.driven.resize_with(path.driven.len().max(command + 1), Vec::new);
+                path.driven[*command].push((number, *factor));
+            }
+        }
         path
     }
 
@@ -296,14 +305,24 @@ impl Path {
         p_w + along(here, p_t)
     }
 
-    /// Adds up what belongs to joints by command.
+    /// What belongs to one command: the sum of what belongs to the joints that it moves.
     #[inline(always)]
-    pub fn by_command<T: Scalar>(&self, velocities: &[Twist<T>], commands: &mut [Twist<T>]) {
-        for (joint, velocity) in self.joints.iter().zip(velocities) {
-            for (command, factor) in &joint.terms {
-                let factor = velocity.w.0[0].lift(*factor);
-                commands[*command] = commands[*command] + velocity.times(factor);
-            }
+    pub fn of_command<T: Scalar>(&self, command: usize, velocities: &[Twist<T>], like: T) -> Twist<T> {
+        let Some([(joint, factor), others @ ..]) = self.driven.get(command).map(Vec::as_slice) else {
+            return Twist::zero(like);
+        };
+        let mut sum = velocities[*joint].times(like.lift(*factor));
+        for (joint, factor) in others {
+            sum = sum + velocities[*joint].times(like.lift(*factor));
+        }
+        sum
+    }
+
+    /// [`Path::of_command`] of all commands.
+    #[inline(always)]
+    pub fn by_command<T: Scalar>(&self, velocities: &[Twist<T>], commands: &mut [Twist<T>], like: T) {
+        for (number, command) in commands.iter_mut().enumerate() {
+            *command = self.of_command(number, velocities, like);
         }
     }
 
