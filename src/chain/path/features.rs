@@ -18,12 +18,7 @@ impl Path {
 
     /// Features of the wrench `y_w` of frame `w`.
     #[inline(always)]
-    pub fn features<T: Scalar>(
-        &self,
-        y_w: Wrench<T>,
-        moved: &[Moved<T>],
-        to: &mut (impl Row<T> + ?Sized),
-    ) {
+    pub fn features<T: Scalar>(&self, y_w: Wrench<T>, moved: &[Moved<T>], to: &mut (impl Row<T> + ?Sized)) {
         let (mut y, mut at) = (y_w, 0);
         for span in &self.spans {
             to.take(at, y.f.0);
@@ -66,9 +61,8 @@ impl Path {
                 let mut slid = still.clone();
                 slid[*joint] = Moved { first: 1.0, second: 1.0 };
                 for f in across.map(|f| here * f) {
-                    let [there, here] = [&slid, &still].map(|moved| {
-                        self.row_of_span(n, Wrench { f, m: zero }, moved)
-                    });
+                    let [there, here] =
+                        [&slid, &still].map(|moved| self.row_of_span(n, Wrench { f, m: zero }, moved));
                     put(there.iter().zip(here).map(|(there, here)| there - here).collect());
                 }
             }
