@@ -110,3 +110,36 @@ impl Row<f64> for OfSpan {
         self.wrench_here()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::Chain;
+    use crate::lie::{Pose, Twist};
+    use crate::machine::{Machine, SHIPPED};
+
+    #[test]
+    fn features_make_the_rows_of_every_machine() {
+        for (name, text) in SHIPPED {
+            let machine = Machine::parse(name, text).expect("a machine that comes with the crate");
+            let off = |n: usize| Twist::from_array(std::array::from_fn(|k| 0.1 * (1.0 + (6 * n + k) as f64).sin()));
+            let dyads = machine.dyads().len();
+            let mut chain = Chain::new(&machine, &(0..dyads).map(off).collect::<Vec<_>>());
+            (0..dyads).step_by(2).for_each(|j| chain.set_carried(j, Pose::exp(off(7 + j))));
+            let path = Path::new(&chain);
+            let q: Vec<f64> = (0..machine.commands().len()).map(|c| (1.0 + c as f64).cos()).collect();
+            let mut moved = vec![Moved::none(0.0); path.joint_count().max(1)];
+            path.go_to(&q, &mut moved);
+            let y_w = Wrench { f: Vec3([0.3, -0.8, 0.5]), m: Vec3([0.2, 0.7, -0.4]) };
+            let (mut row, mut features) = (vec![0.0; 6 * dyads + 3], vec![0.0; path.feature_count()]);
+            let end = path.row(y_w, &moved, &mut row[..]);
+            row[..].take(6 * dyads, end.f.0);
+            path.features(y_w, &moved, &mut features[..]);
+            let made = path.rows_by_feature().tr_mul(&nalgebra::DVector::from_vec(features));
+            let size = row.iter().fold(1.0f64, |most, x| most.max(x.abs()));
+            for (c, (one, other)) in row.iter().zip(&made).enumerate() {
+                assert!((one - other).abs() < 1e-13 * size, "{name}, column {c}: {one} {other}");
+            }
+        }
+    }
+}
