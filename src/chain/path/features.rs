@@ -122,7 +122,8 @@ mod tests {
     fn features_make_the_rows_of_every_machine() {
         for (name, text) in SHIPPED {
             let machine = Machine::parse(name, text).expect("a machine that comes with the crate");
-            let off = |n: usize| Twist::from_array(std::array::from_fn(|k| 0.1 * (1.0 + (6 * n + k) as f64).sin()));
+            let off =
+                |n: usize| Twist::from_array(std::array::from_fn(|k| 0.1 * (1.0 + (6 * n + k) as f64).sin()));
             let dyads = machine.dyads().len();
             let mut chain = Chain::new(&machine, &(0..dyads).map(off).collect::<Vec<_>>());
             (0..dyads).step_by(2).for_each(|j| chain.set_carried(j, Pose::exp(off(7 + j))));
