@@ -12,7 +12,7 @@ mod workload;
 use kincal::Machine;
 use kincal::chain::Batch;
 use kincal::identify::{CalibrateOptions, Loss, Solver, calibrate};
-use kincal::lie::{Pose, Vec3};
+use kincal::lie::Vec3;
 use kincal::nalgebra::DMatrix;
 use kincal::recording::Recording;
 
@@ -45,15 +45,12 @@ fn forward_kinematics(folder: &Folder, machine: &Machine, results: &Results) {
     let mut poses = DMatrix::zeros(units, 12);
     let seconds = time(21, || batch.w_from_t_into(&q, &mut poses));
     results.tell("W1", "batch", &seconds, units, largest_difference(&by_row(&poses), &reference), "");
-    let of_chain = |q: &[f64]| chain.w_from_t(q);
-    let of_batch = |q: &[f64]| batch.pose(q);
-    let ways: [(&str, &dyn Fn(&[f64]) -> Pose<f64>); 2] =
-        [("one at a time", &of_batch), ("one at a time, by the chain", &of_chain)];
-    for (name, one) in ways {
+    for (name, by_chain) in [("one at a time", false), ("one at a time, by the chain", true)] {
         let mut found = vec![0.0; reference.len()];
         let seconds = time(21, || {
             for (q, pose) in joints.chunks_exact(5).zip(found.chunks_exact_mut(12)) {
-                let w_from_t = one(&MACHINE_ORDER.map(|k| q[k]));
+                let q = MACHINE_ORDER.map(|k| q[k]);
+                let w_from_t = if by_chain { chain.w_from_t(&q) } else { batch.pose(&q) };
                 for row in 0..3 {
                     pose[4 * row..4 * row + 3].copy_from_slice(&w_from_t.rotation.0[row]);
                     pose[4 * row + 3] = w_from_t.translation.0[row];
