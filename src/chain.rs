@@ -14,7 +14,7 @@ mod batch;
 mod path;
 
 pub use batch::Batch;
-pub(crate) use path::{Moved, Path};
+pub(crate) use path::{Moved, Path, Row};
 
 /// A machine with constant deviations, ready to be evaluated. Generic over the scalar: the production code and the autodiff
 /// check run the same functions.
@@ -180,7 +180,10 @@ impl<S: Scalar> Link<S> {
             None => b_from_frame,
             Some((kind, axis, drive)) => moved(b_from_frame, *kind, *axis, displacement(drive, q)),
         };
-        self.carried.map_or(behind, |carried| behind * carried)
+        match &self.carried {
+            Some(carried) => behind * *carried,
+            None => behind,
+        }
     }
 }
 

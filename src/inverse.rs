@@ -231,7 +231,7 @@ impl<'a> Inverse<'a> {
         let tip = path.velocities(goal.t_from_tip.translation, &moved, &mut velocities);
         let tip = Pose { rotation: tip.rotation * goal.t_from_tip.rotation, ..tip };
         let mut speeds = Few::from_elem(still, count);
-        path.by_command(&velocities, &mut speeds);
+        path.by_command(&velocities, &mut speeds, 0.0);
         let gap_w = goal.w_from_tip.translation - tip.translation;
         let turn_w = match self.mode {
             Mode::Position => Vec3([0.0; 3]),

@@ -9,9 +9,11 @@ use std::ops::{Add, Mul, Neg, Sub};
 use num_dual::{Dual64, DualNum, DualSVec64};
 
 mod elementary;
+mod fused;
 mod lanes;
 
 pub(crate) use elementary::exponentials;
+pub(crate) use fused::Fused;
 pub(crate) use lanes::{Lanes, MOST_LANES, sines_cosines};
 
 /// A number that the kinematic kernels can work with: `f64`, [`Dual64`], [`DualSVec64`].

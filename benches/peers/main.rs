@@ -1,4 +1,4 @@
-//! The peers' workloads (W1 to W5) on this library, in lines that join the peers' table:
+//! The peers' workloads (W1 to W5b) on this library, in lines that join the peers' table:
 //!
 //! ```text
 //! RAYON_NUM_THREADS=1 PEERS_WORKLOADS=folder cargo bench --bench peers
@@ -20,15 +20,20 @@ use workload::{Folder, MACHINE_ORDER, Results, ac_machine, by_column, by_row, la
 
 fn main() {
     let Some(folder) = Folder::given() else {
-        println!("0 of 5 workloads: PEERS_WORKLOADS names no folder");
+        println!("0 of 6 workloads: PEERS_WORKLOADS names no folder");
         return;
     };
     let (machine, results) = (ac_machine(), Results::asked());
     forward_kinematics(&folder, &machine, &results);
     distance_rows(&folder, &machine, &results);
     arm_jacobian(&folder, &results);
-    identification(&folder, &machine, ("W3", "w3_samples"), &results);
-    identification(&folder, &machine, ("W4", "w4_samples"), &results);
+    for (name, file) in [("W3", "w3_samples"), ("W4", "w4_samples")] {
+        let samples = folder.numbers(file);
+        identification(&machine, name, (workload::distances(&samples), samples.len() / 6), &results);
+    }
+    let samples = folder.numbers("w5_samples");
+    let positions = (workload::positions(&samples), samples.len() / 9);
+    identification(&folder.nominal_arm(), "W5b", positions, &results);
 }
 
 /// W1: where the tool of the nominal machine is at 100 000 random commands.
@@ -40,17 +45,20 @@ fn forward_kinematics(folder: &Folder, machine: &Machine, results: &Results) {
     let mut poses = DMatrix::zeros(units, 12);
     let seconds = time(21, || batch.w_from_t_into(&q, &mut poses));
     results.tell("W1", "batch", &seconds, units, largest_difference(&by_row(&poses), &reference), "");
-    let mut found = vec![0.0; reference.len()];
-    let seconds = time(21, || {
-        for (q, pose) in joints.chunks_exact(5).zip(found.chunks_exact_mut(12)) {
-            let w_from_t = chain.w_from_t(&MACHINE_ORDER.map(|k| q[k]));
-            for row in 0..3 {
-                pose[4 * row..4 * row + 3].copy_from_slice(&w_from_t.rotation.0[row]);
-                pose[4 * row + 3] = w_from_t.translation.0[row];
+    for (name, by_chain) in [("one at a time", false), ("one at a time, by the chain", true)] {
+        let mut found = vec![0.0; reference.len()];
+        let seconds = time(21, || {
+            for (q, pose) in joints.chunks_exact(5).zip(found.chunks_exact_mut(12)) {
+                let q = MACHINE_ORDER.map(|k| q[k]);
+                let w_from_t = if by_chain { chain.w_from_t(&q) } else { batch.pose(&q) };
+                for row in 0..3 {
+                    pose[4 * row..4 * row + 3].copy_from_slice(&w_from_t.rotation.0[row]);
+                    pose[4 * row + 3] = w_from_t.translation.0[row];
+                }
             }
-        }
-    });
-    results.tell("W1", "one at a time", &seconds, units, largest_difference(&found, &reference), "");
+        });
+        results.tell("W1", name, &seconds, units, largest_difference(&found, &reference), "");
+    }
 }
 
 /// W2: a distance and its row of 42 at 100 000 samples of a machine with errors.
@@ -71,6 +79,17 @@ fn distance_rows(folder: &Folder, machine: &Machine, results: &Results) {
         }
     });
     results.tell("W2", "batch; L1-resident output", &seconds, units / 96 * 96, f64::NAN, "");
+    let mut all = vec![0.0; 43 * units];
+    let seconds = time(21, || {
+        for (q, numbers) in joints.chunks_exact(5).zip(all.chunks_exact_mut(43)) {
+            if let Some((distance, row)) = numbers.split_first_mut() {
+                *distance = batch.distance_row(&MACHINE_ORDER.map(|k| q[k]), origin, origin, row);
+            }
+        }
+    });
+    let rows = DMatrix::from_row_slice(units, 43, &all);
+    let check = largest_difference(&folder.rows_of_left_increments("poses_general", &rows), &reference);
+    results.tell("W2", "one at a time", &seconds, units, check, "");
 }
 
 /// W5a: the geometric Jacobian of a six-joint arm at 100 000 random commands.
@@ -86,15 +105,12 @@ fn arm_jacobian(folder: &Folder, results: &Results) {
     results.tell("W5a", "batch", &seconds, units, largest_difference(&by_row(&theirs), &reference), "");
 }
 
-/// W3 and W4: 42 parameters from distances, by ten steps of fixed damping and to the solution.
-fn identification(folder: &Folder, machine: &Machine, (name, file): (&str, &str), results: &Results) {
-    let samples = folder.numbers(file);
-    let text = workload::distances(&samples);
-    let recordings =
-        [Recording::from_bytes("distances.csv", text.into_bytes(), machine).expect("a recording")];
+/// W3, W4 and W5b: parameters from the samples of a recording, by passes of fixed damping and to the solution.
+fn identification(machine: &Machine, name: &str, (text, units): (String, usize), results: &Results) {
+    let recordings = [Recording::from_bytes("samples.csv", text.into_bytes(), machine).expect("a recording")];
     recordings[0].scan().expect("readable rows");
     let options = |solver| CalibrateOptions::default().with_loss(Loss::Squares).with_solver(solver);
-    let (units, runs) = (samples.len() / 6, if samples.len() > 100_000 { 3 } else { 11 });
+    let runs = if units > 20_000 { 3 } else { 11 };
     let after = |steps| {
         time(runs, || {
             calibrate(machine, &recordings, options(Solver::FixedDamping { tau: 1e-8, steps }))

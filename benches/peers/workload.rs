@@ -6,6 +6,7 @@ use std::time::Instant;
 use kincal::Machine;
 use kincal::chain::Chain;
 use kincal::lie::{Mat3, Pose, Vec3, Wrench};
+use kincal::machine::{Dyad, FileUnits, Joint};
 use kincal::nalgebra::DMatrix;
 
 /// Commands of the files in the order x, y, z, a, c; of the machine: a, c, y, x, z.
@@ -62,6 +63,19 @@ impl Folder {
         chain
     }
 
+    /// The arm as it is meant: its base is the pose of the workpiece, seen from there.
+    pub fn nominal_arm(&self) -> Machine {
+        let poses = self.poses("arm_nominal");
+        let joint = |k: usize| {
+            let name = format!("q{k}");
+            let joint = Joint::revolute(name.clone(), [0.0, 0.0, 1.0]);
+            Dyad::new(name).placed(poses[k]).with_joint(joint)
+        };
+        let tool = (1..=6).map(joint).chain([Dyad::new("t").placed(poses[7])]).collect();
+        let workpiece = vec![Dyad::new("w").placed(poses[0].inverse())];
+        Machine::new("arm", FileUnits::si(), workpiece, tool).expect("a machine")
+    }
+
     /// Distances with their rows as the workloads have them: by increments in front of each pose, in the order of the files.
     pub fn rows_of_left_increments(&self, poses: &str, rows: &DMatrix<f64>) -> Vec<f64> {
         let poses = self.poses(poses);
@@ -86,6 +100,17 @@ pub fn distances(samples: &[f64]) -> String {
     for row in samples.chunks_exact(6) {
         let [x, y, z, a, c, r] = row else { unreachable!("six numbers") };
         text.push_str(&format!("{x},{y},{z},{a},{c},{r}\n"));
+    }
+    text
+}
+
+/// The recording of W5b: commands in rad, positions of the tool in the workpiece frame, and how exact they are.
+pub fn positions(samples: &[f64]) -> String {
+    let joints: String = (1..=6).map(|k| format!("q{k}[rad],")).collect();
+    let mut text = format!("# measurement: position\n# sigma[um]: 50\n{joints}px[m],py[m],pz[m]\n");
+    for row in samples.chunks_exact(9) {
+        let row: Vec<String> = row.iter().map(f64::to_string).collect();
+        text.push_str(&(row.join(",") + "\n"));
     }
     text
 }

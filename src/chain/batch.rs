@@ -3,8 +3,9 @@
 use nalgebra::DMatrix;
 use pulp::{Arch, Simd, WithSimd};
 
-use super::{Chain, Moved, Path};
-use crate::lie::{Twist, Vec3, Wrench};
+use super::{Chain, Moved, Path, Row};
+use crate::few::Few;
+use crate::lie::{Pose, Twist, Vec3, Wrench};
 use crate::scalar::{Lanes, MOST_LANES, Scalar};
 
 /// A chain that is laid out for many samples, which are computed as many at a time as the machine has SIMD lanes. Commands and results
@@ -56,6 +57,29 @@ impl Batch {
     /// As [`Batch::w_from_t`], and if the matrix has another size.
     pub fn w_from_t_into(&self, commands: &DMatrix<f64>, poses: &mut DMatrix<f64>) {
         self.walk(commands, poses, 12, Want::Poses);
+    }
+
+    /// `w_from_t` at one row of commands, m or rad: what takes the least time where samples come one by one.
+    ///
+    /// # Panics
+    /// If there are fewer numbers than commands.
+    pub fn pose(&self, q: &[f64]) -> Pose<f64> {
+        self.path.pose_of_one(q)
+    }
+
+    /// As [`Batch::distance_rows_into`] at one row of commands: the length, m, and in `row` the numbers behind it.
+    ///
+    /// # Panics
+    /// If there are fewer numbers than commands, or the row has not six numbers for each dyad.
+    pub fn distance_row(
+        &self,
+        q: &[f64],
+        workpiece_point_w: Vec3<f64>,
+        tool_point_t: Vec3<f64>,
+        row: &mut [f64],
+    ) -> f64 {
+        assert_eq!(row.len(), 6 * self.path.dyad_count(), "numbers of a row");
+        self.path.distance_of_one(q, workpiece_point_w, tool_point_t, row)
     }
 
     /// The length of a bar from the point `workpiece_point_w` to the point `tool_point_t`, m, and behind it its row over all deviations, six
@@ -127,49 +151,79 @@ impl WithSimd for Walk<'_> {
     fn with_simd<S: Simd>(self, simd: S) {
         let (samples, none) = (self.commands.nrows(), Lanes::splat(simd, 0.0));
         let (commands, results) = (self.commands.as_slice(), self.results.as_mut_slice());
-        let mut q = vec![none; self.commands.ncols()];
-        let mut moved = vec![Moved::none(none); self.path.joint_count().max(1)];
-        let mut velocities = vec![Twist::zero(none); self.path.joint_count()];
-        let mut by_command = vec![Twist::zero(none); q.len()];
-        let mut row = vec![none; results.len() / samples];
+        let mut q: Few<Lanes<S>> = Few::from_elem(none, self.commands.ncols());
+        let mut moved: Few<Moved<Lanes<S>>> =
+            Few::from_elem(Moved::none(none), self.path.joint_count().max(1));
+        let mut velocities: Few<Twist<Lanes<S>>> = match self.want {
+            Want::Velocities { .. } => Few::from_elem(Twist::zero(none), self.path.joint_count()),
+            _ => Few::new(),
+        };
+        let (q, moved, velocities) = (&mut q[..], &mut moved[..], &mut velocities[..]);
+        // Lanes that lie across two lines of the cache are written at half the speed or less: behind the first they begin where lines do,
+        // if all columns can.
+        let to_line = results.as_ptr().align_offset(size_of::<S::f64s>());
+        let second = if to_line > 0 && samples % S::F64_LANES == 0 { to_line } else { S::F64_LANES };
         let mut from = 0;
         while from < samples {
             // The last samples are those of full lanes, some of them once more.
             let k = from.min(samples - S::F64_LANES);
             let mut at = k;
-            for q in &mut q {
+            for q in &mut *q {
                 *q = Lanes::load(simd, &commands[at..at + S::F64_LANES]);
                 at += samples;
             }
-            self.path.go_to(&q, &mut moved);
+            self.path.go_to(q, moved);
+            let mut to = Columns { results: &mut *results, from: k, samples };
             match self.want {
                 Want::Poses => {
-                    let pose = self.path.w_from_t(&moved, none);
+                    let pose = self.path.w_from_t(moved, none);
                     let ([x, y, z], [px, py, pz]) = (pose.rotation.0, pose.translation.0);
-                    row.copy_from_slice(&[x[0], x[1], x[2], px, y[0], y[1], y[2], py, z[0], z[1], z[2], pz]);
+                    to.put(0, [x[0], x[1], x[2], px, y[0], y[1]]);
+                    to.put(6, [y[2], py, z[0], z[1], z[2], pz]);
                 }
                 Want::Distances { workpiece_point_w, tool_point_t } => {
-                    let p_w = self.path.point_w(tool_point_t.lift(none), &moved);
+                    let p_w = self.path.point_w(tool_point_t.lift(none), moved);
                     let bar = p_w - workpiece_point_w.lift(none);
-                    row[0] = bar.norm();
-                    let along_w = bar.times(row[0].recip());
-                    self.path.row(Wrench::at_point(along_w, p_w), &moved, &mut row[1..]);
+                    let distance = bar.norm();
+                    to.put(0, [distance]);
+                    let along_w = bar.times(distance.recip());
+                    self.path.row(Wrench::at_point(along_w, p_w), moved, &mut to);
                 }
                 Want::Velocities { tool_point_t } => {
-                    self.path.velocities(tool_point_t.lift(none), &moved, &mut velocities);
-                    by_command.fill(Twist::zero(none));
-                    self.path.by_command(&velocities, &mut by_command);
-                    for (twist, row) in by_command.iter().zip(row.chunks_exact_mut(6)) {
-                        row.copy_from_slice(&twist.to_array());
+                    self.path.velocities(tool_point_t.lift(none), moved, velocities);
+                    for command in 0..q.len() {
+                        to.put(6 * command, self.path.of_command(command, velocities, none).to_array());
                     }
                 }
             }
-            let mut at = k;
-            for value in &row {
-                value.store(&mut results[at..at + S::F64_LANES]);
-                at += samples;
-            }
-            from += S::F64_LANES;
+            from = if from == 0 { second } else { from + S::F64_LANES };
         }
+    }
+}
+
+/// Results column by column, from one sample on.
+struct Columns<'a> {
+    results: &'a mut [f64],
+    from: usize,
+    samples: usize,
+}
+
+impl Columns<'_> {
+    /// Neighbouring columns.
+    #[inline(always)]
+    fn put<S: Simd, const N: usize>(&mut self, first: usize, numbers: [Lanes<S>; N]) {
+        let mut at = first * self.samples + self.from;
+        for number in numbers {
+            number.store(&mut self.results[at..at + S::F64_LANES]);
+            at += self.samples;
+        }
+    }
+}
+
+impl<S: Simd> Row<Lanes<S>> for Columns<'_> {
+    /// Behind the distance.
+    #[inline(always)]
+    fn take<const N: usize>(&mut self, first: usize, numbers: [Lanes<S>; N]) {
+        self.put(1 + first, numbers);
     }
 }

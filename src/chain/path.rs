@@ -13,10 +13,15 @@ use crate::scalar::{Lanes, MOST_LANES, Scalar};
 
 use super::Chain;
 
+mod features;
+mod one;
+
 /// What has to be known of a machine's constants to walk along it, many times.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
     joints: Vec<Joint>,
+    /// By command the joints that it moves, and by what factor.
+    driven: Vec<Vec<(usize, f64)>>,
     spans: Vec<Span>,
     steps: Vec<Step>,
 }
@@ -34,9 +39,17 @@ struct Joint {
 struct Span {
     rotation: Mat3<f64>,
     shift: Vec3<f64>,
-    /// Number of the joint, and where one metre of it leads.
-    slides: Vec<(usize, Vec3<f64>)>,
+    slides: Vec<Slide>,
     turn: Option<Turn>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Slide {
+    joint: usize,
+    /// Where one metre of it leads.
+    way: Vec3<f64>,
+    /// Two unit vectors square to that and to each other.
+    across: [Vec3<f64>; 2],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -75,11 +88,30 @@ pub(crate) struct Moved<T> {
     second: T,
 }
 
+/// Where the numbers of a row go, six for each dyad, or its features.
+pub(crate) trait Row<T> {
+    /// Neighbouring numbers, `first` the place of the first.
+    fn take<const N: usize>(&mut self, first: usize, numbers: [T; N]);
+
+    /// The wrench that goes on behind a turn; another one where it is asked what that would do.
+    #[inline(always)]
+    fn behind_turn(&mut self, y: Wrench<T>) -> Wrench<T> {
+        y
+    }
+}
+
+impl<T: Copy> Row<T> for [T] {
+    #[inline(always)]
+    fn take<const N: usize>(&mut self, first: usize, numbers: [T; N]) {
+        self[first..first + N].copy_from_slice(&numbers);
+    }
+}
+
 impl Path {
     /// The way through a chain.
     pub fn new(chain: &Chain<f64>) -> Self {
         let workpiece = chain.workpiece_count;
-        let mut path = Path { joints: Vec::new(), spans: Vec::new(), steps: Vec::new() };
+        let mut path = Path { joints: Vec::new(), driven: Vec::new(), spans: Vec::new(), steps: Vec::new() };
         let mut open = Span::new(Pose::identity(0.0));
         for j in (0..workpiece).rev().chain(workpiece..chain.links.len()) {
             let (link, on_tool) = (&chain.links[j], j >= workpiece);
@@ -105,7 +137,8 @@ impl Path {
                     path.spans.push(std::mem::replace(&mut open, Span::new(aligned.inverse())));
                 } else {
                     let way = open.rotation * axis.vector();
-                    open.slides.push((number, if back { -way } else { way }));
+                    let way = if back { -way } else { way };
+                    open.slides.push(Slide { joint: number, way, across: way.across() });
                 }
             }
             if !on_tool {
@@ -116,6 +149,12 @@ impl Path {
             path.steps.push(Step { dyad: j, on_tool, here_from_next, joint, carried });
         }
         path.spans.push(open);
+        for (number, joint) in path.joints.iter().enumerate() {
+            for (command, factor) in &joint.terms {
+                path.driven.resize_with(path.driven.len().max(command + 1), Vec::new);
+                path.driven[*command].push((number, *factor));
+            }
+        }
         path
     }
 
@@ -159,29 +198,25 @@ impl Path {
         p
     }
 
-    /// Pose of the tool in the workpiece frame.
+    /// Pose of the tool in the workpiece frame. The third column of its rotation is the product of the other two.
     #[inline(always)]
     pub fn w_from_t<T: Scalar>(&self, moved: &[Moved<T>], like: T) -> Pose<T> {
         let mut spans = self.spans.iter().rev();
-        let (mut columns, mut p) = match spans.next() {
+        let (mut x, mut y, mut p) = match spans.next() {
             Some(last) => {
                 let rotation = last.rotation.lift(like);
-                ([rotation.column(0), rotation.column(1), rotation.column(2)], last.shifted(moved))
+                (rotation.column(0), rotation.column(1), last.shifted(moved))
             }
             None => unreachable!("a path ends with a span"),
         };
         for span in spans {
             if let Some(turn) = span.turn {
-                let [x, y, z] = columns;
-                columns = [turn.apply(x, moved), turn.apply(y, moved), turn.apply(z, moved)];
-                p = turn.apply(p, moved);
+                (x, y, p) = (turn.apply(x, moved), turn.apply(y, moved), turn.apply(p, moved));
             }
-            let ([x, y, z], rotation) = (columns, span.rotation.lift(like));
-            columns = [rotation * x, rotation * y, rotation * z];
-            p = rotation * p + span.shifted(moved);
+            let rotation = span.rotation.lift(like);
+            (x, y, p) = (rotation * x, rotation * y, rotation * p + span.shifted(moved));
         }
-        let [x, y, z] = columns;
-        Pose { rotation: Mat3([x.0, y.0, z.0]).transpose(), translation: p }
+        Pose { rotation: Mat3([x.0, y.0, x.cross(y).0]).transpose(), translation: p }
     }
 
     /// [`Path::w_from_t`] at the commands `q`, m or rad.
@@ -216,7 +251,7 @@ impl Path {
         let [x, y, z] = Mat3::identity(like).0;
         let (mut here, mut p_w) = ([Vec3(x), Vec3(y), Vec3(z)], Vec3::zero(like));
         for span in &self.spans {
-            for (joint, way) in &span.slides {
+            for Slide { joint, way, .. } in &span.slides {
                 velocities[*joint] = Twist::new(along(here, way.lift(like)), Vec3::zero(like));
             }
             p_w = p_w + along(here, span.shifted(moved));
@@ -251,7 +286,7 @@ impl Path {
         let [x, y, z] = Mat3::identity(like).0;
         let (mut here, mut p_w) = ([Vec3(x), Vec3(y), Vec3(z)], Vec3::zero(like));
         for span in &self.spans {
-            for (joint, way) in &span.slides {
+            for Slide { joint, way, .. } in &span.slides {
                 let way_w = along(here, way.lift(like));
                 for (command, factor) in &self.joints[*joint].terms {
                     speeds[*command] = speeds[*command] + way_w.times(like.lift(*factor));
@@ -270,32 +305,47 @@ impl Path {
         p_w + along(here, p_t)
     }
 
-    /// Adds up what belongs to joints by command.
+    /// What belongs to one command: the sum of what belongs to the joints that it moves.
     #[inline(always)]
-    pub fn by_command<T: Scalar>(&self, velocities: &[Twist<T>], commands: &mut [Twist<T>]) {
-        for (joint, velocity) in self.joints.iter().zip(velocities) {
-            for (command, factor) in &joint.terms {
-                let factor = velocity.w.0[0].lift(*factor);
-                commands[*command] = commands[*command] + velocity.times(factor);
-            }
+    pub fn of_command<T: Scalar>(&self, command: usize, velocities: &[Twist<T>], like: T) -> Twist<T> {
+        let Some([(joint, factor), others @ ..]) = self.driven.get(command).map(Vec::as_slice) else {
+            return Twist::zero(like);
+        };
+        let mut sum = velocities[*joint].times(like.lift(*factor));
+        for (joint, factor) in others {
+            sum = sum + velocities[*joint].times(like.lift(*factor));
+        }
+        sum
+    }
+
+    /// [`Path::of_command`] of all commands.
+    #[inline(always)]
+    pub fn by_command<T: Scalar>(&self, velocities: &[Twist<T>], commands: &mut [Twist<T>], like: T) {
+        for (number, command) in commands.iter_mut().enumerate() {
+            *command = self.of_command(number, velocities, like);
         }
     }
 
     /// Six numbers for each dyad, as [`super::Sweep::error_row`] gives them; returns the wrench as frame `t` sees it.
     #[inline(always)]
-    pub fn row<T: Scalar>(&self, y_w: Wrench<T>, moved: &[Moved<T>], row: &mut [T]) -> Wrench<T> {
+    pub fn row<T: Scalar>(
+        &self,
+        y_w: Wrench<T>,
+        moved: &[Moved<T>],
+        row: &mut (impl Row<T> + ?Sized),
+    ) -> Wrench<T> {
         let mut y = y_w;
         for step in &self.steps {
             if step.on_tool {
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
-                row[6 * step.dyad..6 * step.dyad + 6].copy_from_slice(&y.to_array());
-                y = self.through(step, y, moved);
+                row.take(6 * step.dyad, y.to_array());
+                y = self.through(step, y, moved, row);
                 y = step.behind(y);
             } else {
                 y = step.behind(y);
-                y = self.through(step, y, moved);
+                y = self.through(step, y, moved, row);
                 let against = Wrench { f: -y.f, m: -y.m };
-                row[6 * step.dyad..6 * step.dyad + 6].copy_from_slice(&against.to_array());
+                row.take(6 * step.dyad, against.to_array());
                 y = step.here_from_next.lift(y.f.0[0]).carry_wrench(y);
             }
         }
@@ -306,10 +356,17 @@ impl Path {
 impl Path {
     /// A wrench in front of a dyad's joint on the way, as it is seen behind it.
     #[inline(always)]
-    fn through<T: Scalar>(&self, step: &Step, y: Wrench<T>, moved: &[Moved<T>]) -> Wrench<T> {
+    fn through<T: Scalar>(
+        &self,
+        step: &Step,
+        y: Wrench<T>,
+        moved: &[Moved<T>],
+        row: &mut (impl Row<T> + ?Sized),
+    ) -> Wrench<T> {
         let Some((joint, axis)) = step.joint else { return y };
         let (is_turn, moved) = (self.joints[joint].is_turn, moved[joint]);
-        axis.carry(y, if step.on_tool { moved } else { moved.back(is_turn) }, is_turn)
+        let y = axis.carry(y, if step.on_tool { moved } else { moved.back(is_turn) }, is_turn);
+        if is_turn { row.behind_turn(y) } else { y }
     }
 }
 
@@ -373,7 +430,7 @@ impl Span {
     #[inline(always)]
     fn shifted<T: Scalar>(&self, moved: &[Moved<T>]) -> Vec3<T> {
         let mut shift = self.shift.lift(moved[0].first);
-        for (joint, way) in &self.slides {
+        for Slide { joint, way, .. } in &self.slides {
             let (s, Vec3([x, y, z])) = (moved[*joint].first, shift);
             let way = way.lift(s).0;
             shift = Vec3([s.mul_add(way[0], x), s.mul_add(way[1], y), s.mul_add(way[2], z)]);
@@ -389,6 +446,12 @@ impl Turn {
         let sine = if self.back { -sine } else { sine };
         let [x, y, z] = v.0;
         Vec3([cosine.mul_add(x, -(sine * y)), sine.mul_add(x, cosine * y), z])
+    }
+
+    /// What [`Turn::apply`] has done, undone.
+    #[inline(always)]
+    fn undo<T: Scalar>(self, v: Vec3<T>, moved: &[Moved<T>]) -> Vec3<T> {
+        Turn { back: !self.back, ..self }.apply(v, moved)
     }
 }
 

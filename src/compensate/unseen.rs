@@ -136,7 +136,7 @@ impl WithSimd for Shifts<'_> {
                 let mut along = Vec3([none; 3]);
                 along.0[k % 3] = none.offset(1.0);
                 let wrench = if k < 3 { Wrench::at_point(along, tip) } else { Wrench::couple(along) };
-                self.path.row(wrench, &moved, &mut row);
+                self.path.row(wrench, &moved, &mut row[..]);
                 effects.iter_mut().zip(&row).for_each(|(effect, x)| effect[k] = *x);
             }
             for (sum, pattern) in self.sums.iter_mut().zip(self.patterns) {

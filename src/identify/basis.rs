@@ -1,8 +1,9 @@
-//! Which columns of a row the others follow from: one bar centre sees 14 directions of a five-axis machine's 42, on any path.
+//! Over what sums are taken: features that rows are made of, `docs/model.md` (14), as few of them as there have to be.
 //!
-//! At given poses every column of an instrument's rows is a function of the commands, and some are fixed sums of others: those are left
-//! out while sums are taken over samples, `G = Σ rᵀ r` over the basis alone, and made from them once behind it, `Bᵀ G B`. Which they
-//! are shows on rows at general commands, by Gram-Schmidt with the largest column first.
+//! At given poses every number of an instrument's rows is a sum of features of the path, times constants, and some features are fixed sums
+//! of others: one bar centre sees 14 directions of a five-axis machine's 42, on any path. Sums are taken over a basis alone,
+//! `G = Σ φ φᵀ`, and made wide once behind the samples, `Bᵀ G B`. Which features they are shows at general commands, by Gram-Schmidt with
+//! the largest first.
 
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
@@ -13,95 +14,95 @@ use crate::chain::Moved;
 use crate::check::random_command;
 use crate::machine::Machine;
 
-/// What is left of a column beside those before it, over the largest, below which it follows from them: rounding.
+/// What is left of a feature beside those before it, over the largest, below which it follows from them: rounding.
 const FOLLOWS: f64 = 1e-11;
 
-/// Columns, and how all others follow from them.
+/// Features, and how rows are made of them.
 pub(crate) struct Basis {
-    /// Their numbers in a row.
-    pub columns: Vec<usize>,
-    /// One row for each of them, over all columns; none where they are all that counts.
-    whole: Option<DMatrix<f64>>,
-    width: usize,
+    /// Their numbers.
+    pub features: Vec<usize>,
+    /// One row for each of them, over all columns of a row.
+    whole: DMatrix<f64>,
 }
 
 impl Basis {
-    /// The columns that count, as they are.
-    pub fn plain(counts: &[bool]) -> Self {
-        let columns = (0..counts.len()).filter(|i| counts[*i]).collect();
-        Basis { columns, whole: None, width: counts.len() }
+    /// All features that the columns which count have in them.
+    pub fn plain(gauge: &Gauge, counts: &[bool]) -> Self {
+        let rows = gauge.rows_by_feature();
+        let counting: Vec<usize> = (0..counts.len()).filter(|c| counts[*c]).collect();
+        let features: Vec<usize> =
+            (0..rows.nrows()).filter(|i| counting.iter().any(|c| rows[(*i, *c)] != 0.0)).collect();
+        let mut whole = DMatrix::zeros(features.len(), counts.len());
+        for (k, feature) in features.iter().enumerate() {
+            counting.iter().for_each(|c| whole[(k, *c)] = rows[(*feature, *c)]);
+        }
+        Basis { features, whole }
     }
 
-    /// A basis of the columns that count.
+    /// A basis of them.
     pub fn of(gauge: &Gauge, machine: &Machine, counts: &[bool]) -> Self {
-        let rows = general_rows(gauge, machine);
-        let scale: Vec<f64> = (0..counts.len()).map(|c| rows.column(c).norm()).collect();
+        let Basis { features: open, whole: by_feature } = Basis::plain(gauge, counts);
+        let seen = in_general(gauge, machine, &open);
+        let scale: Vec<f64> = seen.column_iter().map(|x| x.norm()).collect();
         let largest = scale.iter().copied().fold(0.0, f64::max);
-        let open: Vec<usize> =
-            (0..counts.len()).filter(|c| counts[*c] && scale[*c] > f64::EPSILON * largest).collect();
-        let mut left: Vec<DVector<f64>> = open.iter().map(|c| rows.column(*c) / scale[*c]).collect();
+        // What is nothing but rounding has no part in it.
+        let is_there: Vec<bool> = scale.iter().map(|x| *x > f64::EPSILON * largest).collect();
+        let mut left = seen;
+        for (mut column, (scale, is_there)) in left.column_iter_mut().zip(scale.iter().zip(&is_there)) {
+            column.scale_mut(if *is_there { scale.recip() } else { 0.0 });
+        }
         // How much of each unit vector found so far is in each column.
         let (mut found, mut amounts): (Vec<usize>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
-        let mut squares = DVector::from_iterator(left.len(), left.iter().map(|x| x.norm_squared()));
-        while !left.is_empty() {
+        let mut squares = DVector::from_iterator(left.ncols(), left.column_iter().map(|x| x.norm_squared()));
+        while found.len() < left.ncols() {
             let (next, square) = squares.argmax();
             if square.sqrt() < FOLLOWS {
                 break;
             }
-            let unit = left[next].normalize();
-            let amount = DVector::from_iterator(left.len(), left.iter().map(|x| x.dot(&unit)));
-            for (i, column) in left.iter_mut().enumerate() {
-                column.axpy(-amount[i], &unit, 1.0);
+            let unit = left.column(next).normalize();
+            let amount = left.tr_mul(&unit);
+            left.ger(-1.0, &unit, &amount, 1.0);
+            found.push(next);
+            for (i, column) in left.column_iter().enumerate() {
                 squares[i] = if found.contains(&i) { 0.0 } else { column.norm_squared() };
             }
-            squares[next] = 0.0;
-            found.push(next);
             amounts.push(amount);
         }
         let rank = found.len();
         let upper = DMatrix::from_fn(rank, rank, |k, l| if k <= l { amounts[k][found[l]] } else { 0.0 });
         let all = DMatrix::from_fn(rank, open.len(), |k, i| amounts[k][i]);
-        let solved = upper.solve_upper_triangular(&all).unwrap_or(all);
-        let mut whole = DMatrix::zeros(rank, counts.len());
-        for (i, column) in open.iter().enumerate() {
+        let mut solved = upper.solve_upper_triangular(&all).unwrap_or(all);
+        for (i, scale_i) in scale.iter().enumerate() {
+            let own = found.iter().position(|f| *f == i);
             for (k, base) in found.iter().enumerate() {
-                whole[(k, *column)] = match found.iter().position(|f| *f == i) {
+                solved[(k, i)] = match own {
                     Some(own) => f64::from(u8::from(own == k)),
-                    None => solved[(k, i)] * scale[*column] / scale[open[*base]],
+                    None => solved[(k, i)] * scale_i / scale[*base],
                 };
             }
         }
-        let columns = found.iter().map(|i| open[*i]).collect();
-        Basis { columns, whole: Some(whole), width: counts.len() }
+        Basis { features: found.iter().map(|i| open[*i]).collect(), whole: solved * by_feature }
     }
 
-    /// Sums over the basis, as sums over all columns.
+    /// Sums over the basis, as sums over all columns of a row.
     pub fn widened(&self, matrix: &DMatrix<f64>, gradient: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        if let Some(whole) = &self.whole {
-            return (whole.tr_mul(&(matrix * whole)), whole.tr_mul(gradient));
-        }
-        let (mut wide, mut long) = (DMatrix::zeros(self.width, self.width), DVector::zeros(self.width));
-        for (a, to_a) in self.columns.iter().enumerate() {
-            long[*to_a] = gradient[a];
-            for (b, to_b) in self.columns.iter().enumerate() {
-                wide[(*to_a, *to_b)] = matrix[(a, b)];
-            }
-        }
-        (wide, long)
+        (self.whole.tr_mul(&(matrix * &self.whole)), self.whole.tr_mul(gradient))
     }
 }
 
-/// Rows at random commands within limits, more of them than columns.
-fn general_rows(gauge: &Gauge, machine: &Machine) -> DMatrix<f64> {
+/// These features at random commands within limits, a column for each, more rows than columns.
+fn in_general(gauge: &Gauge, machine: &Machine, features: &[usize]) -> DMatrix<f64> {
     let mut rng = StdRng::seed_from_u64(20_261_125);
-    let (width, commands, state) = (gauge.width(), machine.commands().len(), gauge.state(0.0));
-    let mut rows = DMatrix::zeros(width, width + 8);
+    let (commands, state) = (machine.commands().len(), gauge.state(0.0));
+    let mut all = vec![0.0; gauge.feature_count()];
+    let mut seen = DMatrix::zeros(features.len() + 8, features.len());
     let mut moved = vec![Moved::none(0.0); gauge.joint_count().max(1)];
-    for (n, mut row) in rows.column_iter_mut().enumerate() {
+    for (n, mut row) in seen.row_iter_mut().enumerate() {
         let q: Vec<f64> = (0..commands).map(|c| random_command(machine, c, &mut rng)).collect();
         let p_w = gauge.go_to(&q, &state, &mut moved);
         let (_, n_w) = gauge.reading(n % gauge.reading_count(), p_w, &state);
-        gauge.row(n_w, p_w, 1.0, &moved, row.as_mut_slice());
+        gauge.features(n_w, p_w, 1.0, &moved, &mut all[..]);
+        row.iter_mut().zip(features).for_each(|(to, feature)| *to = all[*feature]);
     }
-    rows.transpose()
+    seen
 }

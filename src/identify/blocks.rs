@@ -7,13 +7,13 @@ use super::gauge::Gauge;
 use super::loss::Loss;
 use super::stretch::Stretch;
 use super::tally::{COUNTS, Tally};
-use crate::chain::Moved;
+use crate::chain::{Moved, Row};
 use crate::scalar::{Lanes, MOST_LANES, Scalar};
 use crate::sensor::MOST_READINGS;
 use crate::units::Quantity;
 
-/// Samples of a block: its columns stay in a core's nearest cache.
-const SAMPLES: usize = 96;
+/// Lanes of a block: its columns stay in a core's nearest cache.
+const GROUPS: usize = 12;
 /// Columns that are multiplied with as many others at a time: the sums of such a tile are all in registers.
 const TILE: usize = 3;
 
@@ -31,8 +31,8 @@ pub(crate) struct Block<'a> {
     pub samples: Samples<'a>,
     pub sigmas: &'a [f64],
     pub loss: Loss,
-    /// Columns of a row over which sums are taken.
-    pub columns: &'a [usize],
+    /// Features over which sums are taken.
+    pub features: &'a [usize],
 }
 
 /// What a [`Block`] adds.
@@ -49,20 +49,68 @@ impl Samples<'_> {
         Arch::new().dispatch(self)
     }
 
-    /// From sample `from` on, one column a slot: of rows of so many numbers, those of one place. Lanes behind the last sample repeat it.
-    #[inline(always)]
-    fn columns<S: Simd>(&self, simd: S, from: usize, rows: &[f64], to: &mut [Lanes<S>]) {
-        let (width, last) = (to.len(), self.members.len() - 1);
-        let mut at = [0; MOST_LANES];
-        for (l, at) in at[..S::F64_LANES].iter_mut().enumerate() {
-            *at = width * self.members[(from + l).min(last)];
-        }
-        for (c, to) in to.iter_mut().enumerate() {
-            let mut lanes = [0.0; MOST_LANES];
-            for (lane, at) in lanes[..S::F64_LANES].iter_mut().zip(at) {
-                *lane = rows[at + c];
+    /// From sample `from` on, of rows of so many numbers, columns of a height; what is behind the last sample repeats it.
+    fn columns(&self, from: usize, rows: &[f64], width: usize, height: usize, to: &mut [f64]) {
+        let members = &self.members[from..];
+        // Neighbours are the rule, and rows whose width is known are taken apart at several times the speed.
+        if members.len() >= height && members[height - 1] - members[0] == height - 1 {
+            let rows = &rows[width * members[0]..][..width * height];
+            match width {
+                1 => return to.copy_from_slice(rows),
+                2 => return apart::<2>(rows, to),
+                3 => return apart::<3>(rows, to),
+                4 => return apart::<4>(rows, to),
+                5 => return apart::<5>(rows, to),
+                6 => return apart::<6>(rows, to),
+                7 => return apart::<7>(rows, to),
+                8 => return apart::<8>(rows, to),
+                _ => {}
             }
-            *to = Lanes::load(simd, &lanes[..S::F64_LANES]);
+        }
+        let last = self.members.len() - 1;
+        for k in 0..height {
+            let row = &rows[width * self.members[(from + k).min(last)]..][..width];
+            for (c, number) in row.iter().enumerate() {
+                to[height * c + k] = *number;
+            }
+        }
+    }
+}
+
+/// Columns of equal height from rows of `W` numbers.
+fn apart<const W: usize>(rows: &[f64], to: &mut [f64]) {
+    let height = to.len() / W;
+    for (k, row) in rows.as_chunks::<W>().0.iter().enumerate() {
+        for (c, number) in row.iter().enumerate() {
+            to[height * c + k] = *number;
+        }
+    }
+}
+
+/// Of columns of equal height, the lanes from row `from` on.
+#[inline(always)]
+fn take<S: Simd>(simd: S, columns: &[f64], height: usize, from: usize, to: &mut [Lanes<S>]) {
+    for (column, to) in columns.chunks_exact(height).zip(to) {
+        *to = Lanes::load(simd, &column[from..]);
+    }
+}
+
+/// The features that count, each at its place among them.
+struct Chosen<'a, S: Simd> {
+    /// Place of each feature; beyond the end where it does not count.
+    places: &'a [usize],
+    own: &'a mut [Lanes<S>],
+}
+
+impl<S: Simd> Row<Lanes<S>> for Chosen<'_, S> {
+    #[inline(always)]
+    fn take<const N: usize>(&mut self, first: usize, numbers: [Lanes<S>; N]) {
+        let mut k = 0;
+        while k < N {
+            if let Some(to) = self.own.get_mut(self.places[first + k]) {
+                *to = numbers[k];
+            }
+            k += 1;
         }
     }
 }
@@ -80,9 +128,18 @@ impl WithSimd for Samples<'_> {
         let mut measured = [none; MOST_READINGS];
         let state = gauge.state(none);
         let mut lanes = [0.0; MOST_LANES];
+        let height = GROUPS * S::F64_LANES;
+        let mut commands = vec![0.0; q.len() * height];
+        let mut values = vec![0.0; count * height];
         for (group, residuals) in residuals.chunks_mut(count * S::F64_LANES).enumerate() {
-            self.columns(simd, group * S::F64_LANES, &self.stretch.chunk.commands, &mut q);
-            self.columns(simd, group * S::F64_LANES, &self.stretch.chunk.values, &mut measured[..count]);
+            let slot = group % GROUPS * S::F64_LANES;
+            if slot == 0 {
+                let chunk = &self.stretch.chunk;
+                self.columns(group * S::F64_LANES, &chunk.commands, q.len(), height, &mut commands);
+                self.columns(group * S::F64_LANES, &chunk.values, count, height, &mut values);
+            }
+            take(simd, &commands, height, slot, &mut q);
+            take(simd, &values, height, slot, &mut measured[..count]);
             let p_w = gauge.go_to(&q, &state, &mut moved);
             for i in 0..count {
                 (measured[i] - gauge.reading(i, p_w, &state).0).store(&mut lanes[..S::F64_LANES]);
@@ -140,8 +197,8 @@ impl WithSimd for Block<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Sum {
         let none = Lanes::splat(simd, 0.0);
         let Samples { gauge, stretch, members } = self.samples;
-        let (count, width) = (gauge.reading_count(), self.columns.len() + 1);
-        let (tiles, depth) = (width.div_ceil(TILE), SAMPLES / S::F64_LANES * count);
+        let (count, width) = (gauge.reading_count(), self.features.len() + 1);
+        let (tiles, depth) = (width.div_ceil(TILE), GROUPS * count);
         let mut sum = Sum {
             matrix: DMatrix::zeros(width - 1, width - 1),
             gradient: DVector::zeros(width - 1),
@@ -153,7 +210,10 @@ impl WithSimd for Block<'_> {
         let mut squares = vec![[[none; TILE]; TILE]; tiles * (tiles + 1) / 2];
         let mut q = vec![none; stretch.commands];
         let mut moved = vec![Moved::none(none); gauge.joint_count().max(1)];
-        let mut row = vec![none; gauge.width()];
+        let mut places = vec![usize::MAX; gauge.feature_count()];
+        self.features.iter().enumerate().for_each(|(place, feature)| places[*feature] = place);
+        let height = GROUPS * S::F64_LANES;
+        let (mut commands, mut values) = (vec![0.0; q.len() * height], vec![0.0; count * height]);
         let (mut measured, mut standardised) = ([none; MOST_READINGS], [none; MOST_READINGS]);
         // What is plain is summed over lanes: squared standardised readings, by reading.
         let (mut plain, mut plain_groups) = ([none; MOST_READINGS], 0u64);
@@ -164,23 +224,23 @@ impl WithSimd for Block<'_> {
         }
         // Up to here the loss is half of the square, summed over the readings of a sample.
         let plain_below = count as f64 * self.loss.plain_below();
-        for from in (0..members.len()).step_by(SAMPLES) {
-            let filled = (members.len() - from).min(SAMPLES).div_ceil(S::F64_LANES);
+        for from in (0..members.len()).step_by(height) {
+            let filled = (members.len() - from).min(height).div_ceil(S::F64_LANES);
+            self.samples.columns(from, &stretch.chunk.commands, q.len(), height, &mut commands);
+            self.samples.columns(from, &stretch.chunk.values, count, height, &mut values);
             for group in 0..filled {
                 let first = from + group * S::F64_LANES;
-                self.samples.columns(simd, first, &stretch.chunk.commands, &mut q);
-                self.samples.columns(simd, first, &stretch.chunk.values, &mut measured[..count]);
+                take(simd, &commands, height, group * S::F64_LANES, &mut q);
+                take(simd, &values, height, group * S::F64_LANES, &mut measured[..count]);
                 let p_w = gauge.go_to(&q, &state, &mut moved);
                 let mut square = none;
                 for i in 0..count {
                     let (value, n_w) = gauge.reading(i, p_w, &state);
                     standardised[i] = (measured[i] - value).scale(factors[i]);
                     square = standardised[i].mul_add(standardised[i], square);
-                    gauge.row(n_w, p_w, factors[i], &moved, &mut row);
                     let own = rows[(group * count + i) * tiles..][..tiles].as_flattened_mut();
-                    for (column, number) in own.iter_mut().zip(self.columns) {
-                        *column = row[*number];
-                    }
+                    let mut chosen = Chosen { places: &places, own: &mut own[..width - 1] };
+                    gauge.features(n_w, p_w, factors[i], &moved, &mut chosen);
                     own[width - 1] = standardised[i];
                 }
                 if first + S::F64_LANES <= members.len() && square.all_below(plain_below) {

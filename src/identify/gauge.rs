@@ -3,7 +3,9 @@
 //! [`Evaluator`](super::evaluator::Evaluator) takes one sample of anything. Most passes are over constant deviations and lengths, and
 //! there the same rows come from walks along a [`Path`] with as many samples at a time as there are lanes, `docs/model.md` (14) to (17).
 
-use crate::chain::{Moved, Path};
+use nalgebra::DMatrix;
+
+use crate::chain::{Moved, Path, Row};
 use crate::lie::{Vec3, Wrench};
 use crate::scalar::Scalar;
 use crate::sensor::{Sensor, SensorState};
@@ -67,17 +69,34 @@ impl<'a> Gauge<'a> {
         self.sensor.of_point(i, p_w, state)
     }
 
-    /// The row of a reading that answers along `n_w`, times `factor`.
+    /// How many features its rows are made of: those of the path, and one that is constant.
+    pub fn feature_count(&self) -> usize {
+        self.path.feature_count() + 1
+    }
+
+    /// Features of the row of a reading that answers along `n_w`, times `factor`.
     #[inline(always)]
-    pub fn row<T: Scalar>(&self, n_w: Vec3<T>, p_w: Vec3<T>, factor: f64, moved: &[Moved<T>], row: &mut [T]) {
-        let n_w = n_w.times(n_w.0[0].lift(factor));
-        let y_t = self.path.row(Wrench::at_point(n_w, p_w), moved, &mut row[..6 * self.dyads]);
-        let extras = &mut row[6 * self.dyads..];
-        extras[..3].copy_from_slice(&y_t.f.0);
-        let like = n_w.0[0];
-        extras[3] = like.lift(if self.sensor.has_zero() { factor } else { 0.0 });
+    pub fn features<T: Scalar>(
+        &self,
+        n_w: Vec3<T>,
+        p_w: Vec3<T>,
+        factor: f64,
+        moved: &[Moved<T>],
+        to: &mut (impl Row<T> + ?Sized),
+    ) {
+        let factor = n_w.0[0].lift(factor);
+        self.path.features(Wrench::at_point(n_w.times(factor), p_w), moved, to);
+        to.take(self.path.feature_count(), [factor]);
+    }
+
+    /// What each feature adds to a row, a row of the matrix for each. No length changes with the tool's rotation.
+    pub fn rows_by_feature(&self) -> DMatrix<f64> {
+        let extras = 6 * self.dyads;
+        let mut rows = self.path.rows_by_feature().resize(self.feature_count(), self.width(), 0.0);
+        let constant = rows.nrows() - 1;
+        rows[(constant, extras + 3)] = if self.sensor.has_zero() { 1.0 } else { 0.0 };
         let is_relative = matches!(self.sensor, Sensor::Distance { absolute: false });
-        extras[4] = like.lift(if is_relative { -factor } else { 0.0 });
-        extras[5..].fill(like.lift(0.0));
+        rows[(constant, extras + 4)] = if is_relative { -1.0 } else { 0.0 };
+        rows
     }
 }

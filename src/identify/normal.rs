@@ -105,7 +105,7 @@ pub(crate) fn accumulate(
             let sums: Vec<Option<Part>> = sums.into_iter().map(|form| form.map(Part::from)).collect();
             let fits = (sums.iter().zip(&evaluators).zip(&lanes)).all(|((sum, evaluator), lanes)| {
                 let width = |at: usize| match lanes {
-                    Some(gauges) => gauges.get(at).map(|(_, basis)| basis.columns.len()),
+                    Some(gauges) => gauges.get(at).map(|(_, basis)| basis.features.len()),
                     None => (at < evaluator.piece_count()).then(|| evaluator.width()),
                 };
                 let pieces = sum.iter().flat_map(|sum| &sum.pieces).enumerate();
@@ -146,7 +146,7 @@ pub(crate) fn accumulate(
     Ok(normal)
 }
 
-/// What the samples of each recording add up to, over the columns of their bases.
+/// What the samples of each recording add up to, over the features of their bases.
 fn sums(
     machine: &Machine,
     sources: &Sources,
@@ -200,7 +200,7 @@ pub(crate) struct Room<'a> {
 /// Recordings with fewer samples take longer to find a basis than it spares them; a matter of time alone.
 const WORTH_A_BASIS: u64 = 1000;
 
-/// The way over lanes, with the columns that sums are taken over, by piece; none where samples have to be taken one by one.
+/// The way over lanes, with the features that sums are taken over, by piece; none where samples have to be taken one by one.
 fn on_lanes<'a>(
     evaluator: &'a Evaluator,
     layout: &Layout,
@@ -217,7 +217,7 @@ fn on_lanes<'a>(
         let places = places(evaluator, layout, source, &factors, gauge.width());
         let counts: Vec<bool> = places.iter().map(|place| !place.is_empty()).collect();
         let basis = match source.summary.samples < WORTH_A_BASIS {
-            true => Basis::plain(&counts),
+            true => Basis::plain(&gauge, &counts),
             false => Basis::of(&gauge, evaluator.machine, &counts),
         };
         (gauge, basis)
@@ -230,7 +230,7 @@ fn factors(directions: Option<&Directions>, piece: usize) -> Vec<f64> {
     directions.map_or(Vec::new(), |d| (0..d.sets().len()).map(|set| d.factor(set, piece)).collect())
 }
 
-/// As [`part`], over the columns of the bases alone.
+/// As [`part`], over the features of the bases alone.
 fn part_on_lanes(
     evaluator: &Evaluator,
     gauges: &[(Gauge, Basis)],
@@ -240,8 +240,8 @@ fn part_on_lanes(
 ) -> Part {
     let mut part = Part { pieces: Vec::new(), loss: 0.0, tally: Tally::default() };
     for (members, (gauge, basis)) in evaluator.members(stretch).iter().zip(gauges) {
-        let (samples, columns) = (Samples { gauge, stretch, members }, &basis.columns[..]);
-        let sum = (!members.is_empty()).then(|| Block { samples, sigmas, loss, columns }.sum());
+        let (samples, features) = (Samples { gauge, stretch, members }, &basis.features[..]);
+        let sum = (!members.is_empty()).then(|| Block { samples, sigmas, loss, features }.sum());
         if let Some(sum) = &sum {
             part.loss += sum.loss;
             part.tally.add(&sum.tally);

@@ -21,8 +21,8 @@ use crate::variation::{CONSTANT, Varying};
 use crate::wording::count;
 
 /// The first words of both kinds of files.
-const PART: &str = "kincal partial normal equations 1";
-const ROUND: &str = "kincal round 1";
+const PART: &str = "kincal partial normal equations 2";
+const ROUND: &str = "kincal round 2";
 
 /// What some recordings add to an identification: what they say of themselves, and the sums of their samples in every round so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

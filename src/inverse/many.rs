@@ -168,8 +168,7 @@ impl WithSimd for Many<'_> {
                 if open.all_below(0.5) || looks == LOOKS {
                     break left;
                 }
-                speeds.fill(Twist::zero(none));
-                self.actual.by_command(&velocities, &mut speeds);
+                self.actual.by_command(&velocities, &mut speeds, none);
                 // (C2): the turns by the joints that turn.
                 let (axis, one) = (left.axis, none.offset(1.0));
                 let x2 = axis.0[0] * axis.0[0];

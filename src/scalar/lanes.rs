@@ -38,8 +38,9 @@ pub(crate) const MOST_LANES: usize = 8;
 /// Angles beyond this are no angles of a machine, rad.
 const FARTHEST: f64 = 2e9;
 
-/// One number for each lane.
+/// One number for each lane. In memory it begins where a line of the cache does: across two of them it would be read and written twice.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(crate) struct Lanes<S: Simd> {
     simd: S,
     values: S::f64s,

@@ -47,6 +47,31 @@ fn poses_of_a_batch_are_those_of_the_chain() {
 }
 
 #[test]
+fn one_sample_is_what_it_is_among_many() {
+    let (point_w, point_t) = (Vec3([0.3, -0.2, 0.1]), Vec3([0.01, 0.02, 0.15]));
+    for (name, machine) in common::machines() {
+        let (chain, commands) = drawn(&machine, 21, 21);
+        let (batch, width) = (Batch::new(&chain), 6 * machine.dyads().len());
+        let mut rows = DMatrix::zeros(21, 1 + width);
+        batch.distance_rows_into(&commands, point_w, point_t, &mut rows);
+        for k in 0..21 {
+            let q: Vec<f64> = commands.row(k).iter().copied().collect();
+            let (pose, one) = (batch.pose(&q), chain.w_from_t(&q));
+            let size = one.translation.norm().max(1.0);
+            let off = (pose.translation - one.translation).norm() / size;
+            let turned = (pose.inverse() * one).rotation_vector().norm();
+            assert!(off < 1e-14 && turned < 1e-14, "{name}, sample {k}: {off} {turned}");
+            let mut row = vec![0.0; width];
+            let distance = batch.distance_row(&q, point_w, point_t, &mut row);
+            let size = row.iter().fold(1.0f64, |most, x| most.max(x.abs()));
+            for (i, found) in [distance].iter().chain(&row).enumerate() {
+                assert!((rows[(k, i)] - found).abs() < 1e-13 * size, "{name}, sample {k}, column {i}");
+            }
+        }
+    }
+}
+
+#[test]
 fn distance_rows_of_a_batch_are_those_of_the_chain() {
     let (point_w, point_t) = (Vec3([0.3, -0.2, 0.1]), Vec3([0.01, 0.02, 0.15]));
     for (name, machine) in common::machines() {
