@@ -4,6 +4,7 @@
 mod common;
 
 mod browser;
+mod calls;
 mod cli;
 mod compare;
 mod compensate;
