@@ -39,6 +39,9 @@ pub const IDENTIFIED: f64 = 0.9;
 /// No more than this part of the variance that the tolerances allow may lie where the data see nothing at all; it is there for
 /// rounding only.
 pub const UNSEEN: f64 = 1e-6;
+/// Of the directions that move the tool a calibrated file lists those that keep more than this part of the variance that the tolerances
+/// allow. It is less than what [`IDENTIFIED`] leaves, so that the list tells what is not identified (`docs/location.md`).
+pub(crate) const LISTED: f64 = 0.09;
 /// Directions closer than this to a coordinate direction bear its plain letter, rad.
 const ALIGNED: f64 = 1e-3;
 /// Sine of the angle between two linear axes below which they do not span a plane.
@@ -72,6 +75,12 @@ impl Functional {
             0.0
         }
     }
+
+    /// Whether a number may be told and entered: a share of at least [`IDENTIFIED`], and nothing of it where the data see nothing.
+    /// Whatever is called identified, and whatever an export writes, is decided here.
+    pub fn is_identified(&self) -> bool {
+        self.share() >= IDENTIFIED && self.unseen <= UNSEEN
+    }
 }
 
 /// Whoever knows how sure functions of the deviations are.
@@ -100,7 +109,7 @@ pub struct LocationError {
     pub std_error: f64,
     /// What share of it comes from the data, 0 to 1: `1 - posterior variance / prior variance`.
     pub share: f64,
-    /// Whether it may be told: a share of at least [`IDENTIFIED`], and nothing of it where the data see nothing.
+    /// Whether it may be told, [`Functional::is_identified`].
     pub identified: bool,
 }
 
@@ -157,7 +166,6 @@ pub fn location_errors(
                 Some(information) => information.of_deviations(&scaled),
                 None => Functional::prior_only(scaled.iter().map(|g| g * g).sum()),
             };
-            let share = known.share();
             LocationError {
                 name: geometry.name(item),
                 axis: geometry.axes[item.axis].joint.clone(),
@@ -165,8 +173,8 @@ pub fn location_errors(
                 value,
                 unit: if item.offset { "m" } else { "rad" }.into(),
                 std_error: known.posterior_variance.sqrt(),
-                share,
-                identified: share >= IDENTIFIED && known.unseen <= UNSEEN,
+                share: known.share(),
+                identified: known.is_identified(),
             }
         })
         .collect();

@@ -4,6 +4,7 @@
 //! that of the tool list `t`; neither has a joint. A serial robot's workpiece list holds `w` alone. Nothing else in this crate
 //! knows what kind of machine it is. `docs/machines.md` teaches the RON form.
 
+mod dh;
 mod dyad;
 mod explain;
 mod fault;
@@ -14,9 +15,13 @@ mod shipped;
 mod side;
 mod write;
 
+#[cfg(feature = "import")]
+pub(crate) use dh::{DhParameters, moves as dh_moves};
 pub use dyad::{Dyad, Joint, JointKind, MassPoint, NcWord, Placement, Tolerance};
 pub use explain::explained;
 pub use fault::MachineFault;
+#[cfg(feature = "import")]
+pub(crate) use form::MoveForm;
 pub(crate) use form::{AngleUnit, LengthUnit, MachineForm, Triple, UnitsForm};
 pub(crate) use number::{Checked, OF_CALIBRATION, number, vec_to_si};
 pub(crate) use read::{at_path, is_usable_name};

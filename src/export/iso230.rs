@@ -40,7 +40,7 @@ pub(super) fn write(calibrated: &CalibratedMachine) -> Result<Exported> {
     for error in &found.errors {
         let offset = error.unit == "m";
         let unit = if offset { UM } else { URAD };
-        let determined = error.share >= 0.99 || !known.is_stated();
+        let determined = known.determines(error);
         let value = determined.then_some(error.value * unit.per_si);
         let because = (!determined).then(|| {
             format!(

@@ -4,11 +4,14 @@ use super::travel::poses;
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
 use crate::lie::Twist;
-use crate::location::{Functional, Knowledge};
+use crate::location::{Functional, IDENTIFIED, Knowledge, LISTED, LocationError};
 
-/// A number is determined where no more than this part of the variance that the tolerances allow lies along what the recordings left
-/// open: a tenth of the tolerances as a standard deviation.
-const OPEN: f64 = 0.01;
+/// No more than this part of the variance that the tolerances allow may lie along what the file lists as unseen: with what it need not
+/// list, [`LISTED`], the data's share is still [`IDENTIFIED`]. A tenth of the tolerances as a standard deviation.
+const OPEN: f64 = 1.0 - IDENTIFIED - LISTED;
+
+/// A pattern of which the data bring no more than this part is one that they do not see at all.
+const NOTHING: f64 = 1e-6;
 
 /// What a number changes by less is rounding, in its own unit.
 const ROUNDING: f64 = 1e-11;
@@ -21,16 +24,20 @@ pub(super) struct Known<'a> {
 /// How sure a number is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Verdict {
-    /// Standard deviation that the tolerances alone allow, in the number's own unit.
-    pub allowed: f64,
-    /// Standard deviation along what the recordings left open.
+    /// Standard deviation along what the recordings left open, in the number's own unit.
     pub open: f64,
+    determined: bool,
 }
 
 impl Verdict {
     pub fn is_determined(self) -> bool {
-        self.open * self.open <= OPEN * self.allowed * self.allowed + ROUNDING * ROUNDING
+        self.determined
     }
+}
+
+/// Whether a number that was judged by a calibrated file may be entered.
+fn may_be_entered(identified: bool, share: f64) -> bool {
+    identified && share >= 1.0 - OPEN
 }
 
 impl<'a> Known<'a> {
@@ -41,6 +48,11 @@ impl<'a> Known<'a> {
     /// Whether the file says anything of it at all.
     pub fn is_stated(&self) -> bool {
         self.calibrated.unseen().is_some()
+    }
+
+    /// Whether a location error that was judged by it may be entered.
+    pub fn determines(&self, error: &LocationError) -> bool {
+        !self.is_stated() || may_be_entered(error.identified, error.share)
     }
 
     /// What has to be known of a file that says nothing of what its recordings have seen.
@@ -65,44 +77,66 @@ impl<'a> Known<'a> {
             };
             functions(&moved(1.0)).iter().zip(functions(&moved(-1.0))).map(|(a, b)| 0.5 * (a - b)).collect()
         };
-        let count = functions(dh).len();
-        let (mut allowed, mut open) = (vec![0.0; count], vec![0.0; count]);
-        let add = |sums: &mut Vec<f64>, changes: Vec<f64>| {
-            sums.iter_mut().zip(changes).for_each(|(sum, change)| *sum += change * change);
-        };
+        let mut allowed = vec![0.0; functions(dh).len()];
         // Where the workpiece stands is no matter of the machine.
         for j in (0..dh.len()).filter(|j| *j != machine.w_index()) {
             for (k, tolerance) in machine.tolerance(j).to_array().into_iter().enumerate() {
                 let mut by = vec![Twist::zero(0.0); dh.len()];
                 by[j] = Twist::from_array(std::array::from_fn(|i| if i == k { tolerance } else { 0.0 }));
-                add(&mut allowed, half_change(&by));
+                let changes = half_change(&by);
+                allowed.iter_mut().zip(changes).for_each(|(sum, change)| *sum += change * change);
             }
         }
-        for pattern in self.calibrated.unseen().unwrap_or_default() {
-            let mut by = pattern.clone();
-            by[machine.w_index()] = Twist::zero(0.0);
-            add(&mut open, half_change(&by));
+        let patterns = self.calibrated.unseen().unwrap_or_default();
+        let changes: Vec<Vec<f64>> = patterns
+            .iter()
+            .map(|pattern| {
+                let mut by = pattern.clone();
+                by[machine.w_index()] = Twist::zero(0.0);
+                half_change(&by)
+            })
+            .collect();
+        let verdict = |(i, allowed): (usize, f64)| {
+            let known = self.functional(allowed, changes.iter().map(|changes| changes[i]));
+            let open = known.posterior_variance;
+            let may = || may_be_entered(known.is_identified(), known.share());
+            Verdict { open: open.sqrt(), determined: open <= ROUNDING * ROUNDING || may() }
+        };
+        allowed.into_iter().enumerate().map(verdict).collect()
+    }
+
+    /// What is known of a function, from its changes by each pattern.
+    fn functional(&self, prior_variance: f64, changes: impl Iterator<Item = f64>) -> Functional {
+        let (mut open, mut unseen) = (0.0, 0.0);
+        for (pattern, change) in self.calibrated.unseen().unwrap_or_default().iter().zip(changes) {
+            let square = change * change;
+            open += square;
+            // Of a pattern that is one standard deviation long, its length in tolerances says how much the data bring.
+            if self.scaled(pattern).map(|x| x * x).sum::<f64>() >= 1.0 - NOTHING {
+                unseen += square;
+            }
         }
-        allowed.iter().zip(open).map(|(a, o)| Verdict { allowed: a.sqrt(), open: o.sqrt() }).collect()
+        let unseen = if prior_variance > 0.0 { unseen / prior_variance } else { 0.0 };
+        Functional { prior_variance, posterior_variance: open, unseen }
+    }
+
+    /// The components of a pattern in units of their tolerances.
+    fn scaled<'p>(&'p self, pattern: &'p [Twist<f64>]) -> impl Iterator<Item = f64> + 'p {
+        let machine = self.calibrated.machine();
+        pattern.iter().enumerate().flat_map(move |(j, dh)| {
+            let tolerances = machine.tolerance(j).to_array();
+            dh.to_array().into_iter().zip(tolerances).map(|(x, tolerance)| x / tolerance)
+        })
     }
 }
 
 impl Knowledge for Known<'_> {
     fn of_deviations(&self, by_dyad_scaled: &[f64]) -> Functional {
-        let machine = self.calibrated.machine();
         let along = |pattern: &Vec<Twist<f64>>| -> f64 {
-            let scaled = pattern.iter().enumerate().flat_map(|(j, dh)| {
-                dh.to_array()
-                    .into_iter()
-                    .zip(machine.tolerance(j).to_array())
-                    .map(|(x, tolerance)| x / tolerance)
-            });
-            scaled.zip(by_dyad_scaled).map(|(x, g)| x * g).sum::<f64>().powi(2)
+            self.scaled(pattern).zip(by_dyad_scaled).map(|(x, g)| x * g).sum()
         };
         let prior_variance: f64 = by_dyad_scaled.iter().map(|g| g * g).sum();
-        let open = self.calibrated.unseen().unwrap_or_default().iter().map(along).sum::<f64>();
-        let unseen = if prior_variance > 0.0 { open / prior_variance } else { 0.0 };
-        Functional { prior_variance, posterior_variance: open, unseen }
+        self.functional(prior_variance, self.calibrated.unseen().unwrap_or_default().iter().map(along))
     }
 }
 

@@ -10,16 +10,15 @@ use super::unknowns::{Layout, Role};
 use crate::chain::Chain;
 use crate::check::random_command;
 use crate::lie::{Twist, Vec3, Wrench};
+use crate::location::LISTED;
 use crate::machine::Machine;
 
-/// Directions of which the data bring less than this part of the variance.
-const MOSTLY_UNSEEN: f64 = 0.1;
 /// Poses over which the directions that move the tool are gathered.
 const POSES: usize = 24;
 
 /// Patterns of deviations, one twist per dyad in machine order (m, rad), each one standard deviation long,
 /// `docs/compensate.md` (C13): of all directions that move the tool as the workpiece sees it, those that come
-/// from the tolerances by more than a tenth of their variance.
+/// from the tolerances by more than [`LISTED`] of their variance.
 pub(super) fn unseen(machine: &Machine, layout: &Layout, information: &Information) -> Vec<Vec<Twist<f64>>> {
     let count = information.positions.len();
     if count == 0 {
@@ -74,7 +73,7 @@ pub(super) fn unseen(machine: &Machine, layout: &Layout, information: &Informati
     let weights = information.strength.map(|s| 1.0 / (1.0 + s));
     let posterior = along.transpose() * DMatrix::from_diagonal(&weights) * along;
     let eigen = SymmetricEigen::new(posterior);
-    let mut order: Vec<usize> = (0..moving.len()).filter(|i| eigen.eigenvalues[*i] > MOSTLY_UNSEEN).collect();
+    let mut order: Vec<usize> = (0..moving.len()).filter(|i| eigen.eigenvalues[*i] > LISTED).collect();
     order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
     let pattern = |i: usize| {
         let scaled = &basis * eigen.eigenvectors.column(i) * eigen.eigenvalues[i].sqrt();

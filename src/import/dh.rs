@@ -12,7 +12,7 @@ use super::sheet::{Row, Sheet};
 use super::step::Move;
 use crate::error::Result;
 use crate::lie::{Pose, Twist, Vec3};
-use crate::machine::{FileUnits, JointKind};
+use crate::machine::{DhParameters, FileUnits, JointKind, MoveForm, dh_moves};
 use crate::units::{Quantity, Unit};
 use columns::Columns;
 
@@ -31,26 +31,10 @@ struct Link {
     name: String,
     line: usize,
     kind: JointKind,
-    theta: f64,
-    d: f64,
-    a: f64,
-    alpha: f64,
-    beta: f64,
+    parameters: DhParameters,
     sign: f64,
     travel: Option<(f64, f64)>,
     follows: Vec<Term>,
-}
-
-impl Link {
-    /// Along and about the joint's own axis.
-    fn own(&self) -> [Move; 2] {
-        [Move::Turn(2, self.theta), Move::Shift(2, self.d)]
-    }
-
-    /// From its axis to the next one, or from the one before in the modified convention.
-    fn link(&self) -> [Move; 3] {
-        [Move::Shift(0, self.a), Move::Turn(0, self.alpha), Move::Turn(1, self.beta)]
-    }
 }
 
 pub(super) fn read(file: &Path, text: &str, form: Option<Form>) -> Result<Chain> {
@@ -74,16 +58,10 @@ pub(super) fn read(file: &Path, text: &str, form: Option<Form>) -> Result<Chain>
     }
     let (base, tool) = (placed(&sheet, "base")?, placed(&sheet, "tool")?);
     let mut entries = Vec::new();
-    // What stands between the last axis and the frame that comes next.
-    let (mut moves, mut before): (Vec<Move>, Option<Pose<f64>>) = (Vec::new(), base);
-    for link in &links {
-        match modified {
-            true => {
-                moves.extend(link.link());
-                moves.extend(link.own());
-            }
-            false => moves.extend(link.own()),
-        }
+    let parameters: Vec<DhParameters> = links.iter().map(|link| link.parameters).collect();
+    let mut moves = dh_moves(&parameters, modified).into_iter();
+    let mut before: Option<Pose<f64>> = base;
+    for (link, moves) in links.iter().zip(moves.by_ref()) {
         let axis = Vec3([0.0, 0.0, link.sign]);
         let joint = JointEntry {
             kind: link.kind,
@@ -92,13 +70,10 @@ pub(super) fn read(file: &Path, text: &str, form: Option<Form>) -> Result<Chain>
             nc: None,
             follows: link.follows.iter().map(|term| (term.name.clone(), term.factor)).collect(),
         };
-        entries.push(entry(&link.name, before.take(), std::mem::take(&mut moves), Some(joint), link.line));
-        if !modified {
-            moves.extend(link.link());
-        }
+        entries.push(entry(&link.name, before.take(), moves, Some(joint), link.line));
     }
     let line = links.last().map_or(0, |link| link.line);
-    let mut end = entry("t", before, moves, None, line);
+    let mut end = entry("t", before, moves.next().unwrap_or_default(), None, line);
     end.note = "tool".into();
     if let Some(tool) = tool {
         end.offset = Some(end.offset.unwrap_or(Pose::identity(0.0)) * tool);
@@ -123,11 +98,11 @@ pub(super) fn read(file: &Path, text: &str, form: Option<Form>) -> Result<Chain>
 fn entry(
     frame: &str,
     before: Option<Pose<f64>>,
-    moves: Vec<Move>,
+    moves: Vec<MoveForm>,
     joint: Option<JointEntry>,
     line: usize,
 ) -> Entry {
-    let moves: Vec<Move> = moves.into_iter().filter(|m| !m.is_none()).collect();
+    let moves: Vec<Move> = moves.into_iter().map(Move::from).filter(|m| !m.is_none()).collect();
     let (moves, offset) = match before {
         Some(pose) => (Vec::new(), Some(pose * Move::all(&moves))),
         None => (moves, None),
@@ -228,25 +203,23 @@ fn link(sheet: &Sheet, columns: &Columns, row: &Row, name: &str, names: &[String
         }
     };
     let turns = kind == JointKind::Revolute;
-    let mut link = Link {
-        name: name.to_string(),
-        line: row.line,
-        kind,
+    let parameters = DhParameters {
         theta: value(columns.theta, Quantity::Angle, turns)?,
         d: value(columns.d, Quantity::Length, !turns)?,
         a: value(Some(columns.a), Quantity::Length, false)?,
         alpha: value(Some(columns.alpha), Quantity::Angle, false)?,
         beta: value(columns.beta, Quantity::Angle, false)?,
+    };
+    let mut link = Link {
+        name: name.to_string(),
+        line: row.line,
+        kind,
+        parameters,
         sign: columns.sign(sheet, row)?,
         travel: columns.travel(sheet, row, kind)?,
         follows: columns.follows(sheet, row, name, names)?,
     };
-    let offset = columns.offset.value(sheet, row, kind)?.unwrap_or(0.0);
-    if turns {
-        link.theta += offset;
-    } else {
-        link.d += offset;
-    }
+    link.parameters = parameters.moved(kind, columns.offset.value(sheet, row, kind)?.unwrap_or(0.0));
     Ok(link)
 }
 

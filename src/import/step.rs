@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::error::Place;
 use crate::lie::{Pose, Vec3};
-use crate::machine::{FileUnits, JointKind};
+use crate::machine::{FileUnits, JointKind, MoveForm};
 
 /// A move from one frame to the next, m and rad: elementary, about or along the axis 0, 1, 2; or any.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +12,19 @@ pub(super) enum Move {
     Turn(usize, f64),
     Shift(usize, f64),
     Pose(Pose<f64>),
+}
+
+impl From<MoveForm> for Move {
+    fn from(step: MoveForm) -> Self {
+        match step {
+            MoveForm::Tx(by) => Move::Shift(0, by),
+            MoveForm::Ty(by) => Move::Shift(1, by),
+            MoveForm::Tz(by) => Move::Shift(2, by),
+            MoveForm::Rx(by) => Move::Turn(0, by),
+            MoveForm::Ry(by) => Move::Turn(1, by),
+            MoveForm::Rz(by) => Move::Turn(2, by),
+        }
+    }
 }
 
 impl Move {

@@ -9,8 +9,25 @@ pub enum MachineFault {
     /// A branch without a frame.
     #[error("list `{branch}` is empty")]
     EmptyBranch {
-        /// `workpiece` or `tool`.
+        /// `workpiece`, `tool` or `dh.rows`.
         branch: String,
+    },
+    /// A list of frames that is not there, and no block `dh` in its place.
+    #[error("field `{list}` of `Machine` is missing")]
+    MissingList {
+        /// `workpiece` or `tool`.
+        list: String,
+    },
+    /// Denavit-Hartenberg parameters beside the list that they stand for.
+    #[error("`dh` stands beside `tool`")]
+    DhBesideTool,
+    /// A row of `dh` whose sign is none.
+    #[error("sign of joint \"{joint}\" is {sign}")]
+    Sign {
+        /// Name of the joint.
+        joint: String,
+        /// As written.
+        sign: i8,
     },
     /// The last frame of a list has the wrong name.
     #[error("list `{branch}` ends with frame \"{found}\", not with \"{expected}\"")]
@@ -185,10 +202,16 @@ impl Fault for MachineFault {
     fn mend(&self) -> String {
         use MachineFault::*;
         match self {
+            EmptyBranch { branch } if branch == "dh.rows" => {
+                "write a row for each joint: (joint: \"q1\", d: 330, a: 50, alpha: -90)".into()
+            }
             EmptyBranch { branch } => {
                 let last = if branch == "tool" { "t" } else { "w" };
                 format!("write at least the last frame: {branch}: [(frame: \"{last}\")]")
             }
+            MissingList { list } => format!("add `{list}: ...`; `dh: ...` may stand in place of both lists"),
+            DhBesideTool => "leave one of them out: `dh` says all frames from the base to the tool".into(),
+            Sign { .. } => "write 1, or -1 where the joint counts the other way".into(),
             LastFrame { branch, expected, .. } => {
                 format!("end the list `{branch}` with (frame: \"{expected}\", at: (x, y, z))")
             }

@@ -20,8 +20,12 @@ pub(crate) struct MachineForm<C> {
     pub gravity: Option<Triple>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<ToleranceForm>,
-    pub workpiece: Vec<DyadForm>,
-    pub tool: Vec<DyadForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub workpiece: Option<Vec<DyadForm>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<Vec<DyadForm>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dh: Option<DhForm>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub side_branches: Vec<SideBranchForm>,
     #[serde(default = "nothing", skip_serializing_if = "Option::is_none")]
@@ -91,6 +95,22 @@ pub(crate) struct DyadForm {
     pub tolerance: Option<ToleranceForm>,
 }
 
+impl DyadForm {
+    /// A frame without a joint that stands where the one before it stands.
+    pub(super) fn fixed(frame: impl Into<String>) -> DyadForm {
+        DyadForm {
+            frame: frame.into(),
+            at: None,
+            rotation: None,
+            moves: None,
+            joint: None,
+            mass: None,
+            centre_of_mass: None,
+            tolerance: None,
+        }
+    }
+}
+
 /// One elementary move; a list of them, from left to right, says any initial pose: DH, modified DH, roll-pitch-yaw.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(crate) enum MoveForm {
@@ -100,6 +120,81 @@ pub(crate) enum MoveForm {
     Rx(f64),
     Ry(f64),
     Rz(f64),
+}
+
+impl MoveForm {
+    /// Its axis 0, 1, 2, by how much, and whether it turns.
+    pub(super) fn parts(self) -> (usize, f64, bool) {
+        match self {
+            MoveForm::Tx(value) => (0, value, false),
+            MoveForm::Ty(value) => (1, value, false),
+            MoveForm::Tz(value) => (2, value, false),
+            MoveForm::Rx(value) => (0, value, true),
+            MoveForm::Ry(value) => (1, value, true),
+            MoveForm::Rz(value) => (2, value, true),
+        }
+    }
+}
+
+/// Denavit-Hartenberg parameters in place of the list `tool`.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "dh", deny_unknown_fields)]
+pub(crate) struct DhForm {
+    pub convention: ConventionForm,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<Vec<MoveForm>>,
+    pub rows: Vec<DhRowForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<Vec<MoveForm>>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+#[allow(non_camel_case_types)]
+pub(crate) enum ConventionForm {
+    #[serde(alias = "standard")]
+    classic,
+    modified,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize)]
+#[allow(non_camel_case_types)]
+pub(crate) enum KindForm {
+    #[default]
+    revolute,
+    prismatic,
+}
+
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(rename = "row", deny_unknown_fields)]
+pub(crate) struct DhRowForm {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    #[serde(default)]
+    pub kind: KindForm,
+    #[serde(default)]
+    pub theta: f64,
+    #[serde(default)]
+    pub d: f64,
+    pub a: f64,
+    pub alpha: f64,
+    #[serde(default)]
+    pub beta: f64,
+    #[serde(default)]
+    pub offset: f64,
+    #[serde(default = "plus")]
+    pub sign: i8,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub travel: Option<(f64, f64)>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub follows: Option<BTreeMap<String, f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nc: Option<NcForm>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centre_of_mass: Option<Triple>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tolerance: Option<ToleranceForm>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]

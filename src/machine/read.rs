@@ -6,8 +6,7 @@ use std::path::Path;
 use serde::de::IgnoredAny;
 
 use super::form::{
-    AxisForm, DyadForm, JointBody, JointForm, MachineForm, MoveForm, SideBranchForm, ToleranceForm, Triple,
-    UnitsForm,
+    AxisForm, DyadForm, JointBody, JointForm, MachineForm, SideBranchForm, ToleranceForm, Triple, UnitsForm,
 };
 use super::number::{Checked, LARGEST, finite, number, to_si, vec_to_si};
 use super::{
@@ -41,6 +40,24 @@ impl Machine {
     }
 
     pub(crate) fn from_form<C>(form: &MachineForm<C>) -> Checked<Machine> {
+        let missing = |list: &str| (list.to_string(), MachineFault::MissingList { list: list.into() });
+        let (workpiece, tool) = (form.workpiece.as_deref(), form.tool.as_deref());
+        match (&form.dh, tool) {
+            (None, tool) => {
+                let workpiece = workpiece.ok_or_else(|| missing("workpiece"))?;
+                Machine::from_lists(form, workpiece, tool.ok_or_else(|| missing("tool"))?)
+            }
+            (Some(_), Some(_)) => Err(("dh".into(), MachineFault::DhBesideTool)),
+            (Some(dh), None) => {
+                let tool = super::dh::dyads(dh, form.units.units())?;
+                let w = [DyadForm::fixed("w")];
+                let machine = Machine::from_lists(form, workpiece.unwrap_or(&w), &tool);
+                machine.map_err(|(path, fault)| (super::dh::path_in(dh, path), fault))
+            }
+        }
+    }
+
+    fn from_lists<C>(form: &MachineForm<C>, workpiece: &[DyadForm], tool: &[DyadForm]) -> Checked<Machine> {
         let units = form.units.units();
         let branch = |branch: Branch, forms: &[DyadForm]| -> Checked<Vec<Dyad>> {
             let path = |i| format!("{}[{i}]", branch.field());
@@ -49,8 +66,8 @@ impl Machine {
         let mut machine = Machine::of_dyads(
             form.name.clone(),
             units,
-            branch(Branch::Workpiece, &form.workpiece)?,
-            branch(Branch::Tool, &form.tool)?,
+            branch(Branch::Workpiece, workpiece)?,
+            branch(Branch::Tool, tool)?,
         )?
         .with_about(form.about.clone());
         if let Some(gravity) = form.gravity {
@@ -283,14 +300,7 @@ fn placement(form: &DyadForm, units: FileUnits, path: &str) -> Checked<Placement
     }
     let mut pose = Pose::identity(0.0);
     for (i, step) in moves.iter().enumerate() {
-        let (along, value, turns) = match *step {
-            MoveForm::Tx(value) => (0, value, false),
-            MoveForm::Ty(value) => (1, value, false),
-            MoveForm::Tz(value) => (2, value, false),
-            MoveForm::Rx(value) => (0, value, true),
-            MoveForm::Ry(value) => (1, value, true),
-            MoveForm::Rz(value) => (2, value, true),
-        };
+        let (along, value, turns) = step.parts();
         let unit = if turns { units.angle } else { units.length };
         let value = to_si(format!("{path}.moves[{i}]"), value, unit, "a move")?;
         let axis = Vec3(std::array::from_fn(|k| if k == along { 1.0 } else { 0.0 }));

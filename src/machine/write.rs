@@ -29,8 +29,9 @@ impl Machine {
             units: UnitsForm { length: length_word(units.length), angle: angle_word(units.angle) },
             gravity: (gravity.0 != [0.0, 0.0, -1.0]).then_some(triple(gravity)),
             tolerance: (self.tolerance != Tolerance::DEFAULT).then(|| tolerance(self.tolerance, units)),
-            workpiece: forms(workpiece),
-            tool: forms(tool),
+            workpiece: Some(forms(workpiece)),
+            tool: Some(forms(tool)),
+            dh: None,
             side_branches: (self.side_branches.iter())
                 .map(|side| SideBranchForm {
                     on: side.on.clone(),

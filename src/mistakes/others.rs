@@ -51,8 +51,8 @@ fn exchanged(machine: &Machine) -> Option<Machine> {
         return None;
     }
     std::mem::swap(&mut form.workpiece, &mut form.tool);
-    form.workpiece.last_mut()?.frame = "w".into();
-    form.tool.last_mut()?.frame = "t".into();
+    form.workpiece.as_mut()?.last_mut()?.frame = "w".into();
+    form.tool.as_mut()?.last_mut()?.frame = "t".into();
     Machine::from_form(&form).ok()
 }
 

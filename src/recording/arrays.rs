@@ -135,6 +135,11 @@ impl Arrays {
         self.line(format!("setup: {name}"))
     }
 
+    /// The name of the instrument, which reports tell.
+    pub fn instrument(self, name: &str) -> Self {
+        self.line(format!("instrument: {name}"))
+    }
+
     /// The measured point in frame `t`, m; its origin unless told otherwise.
     pub fn tool_point(self, p_t: Vec3<f64>) -> Self {
         let [x, y, z] = p_t.0;

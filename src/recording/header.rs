@@ -37,6 +37,8 @@ pub struct Header {
     pub sigma: Option<Sigma>,
     /// Unit vector of the measured direction in frame `w` (`displacement`).
     pub direction_w: Option<Vec3<f64>>,
+    /// Name of the instrument, as the file says it.
+    pub instrument: Option<String>,
 }
 
 /// What was measured.
@@ -116,7 +118,7 @@ pub struct Sigma {
 }
 
 /// Every known key, in the order in which messages list them.
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "machine",
     "measurement",
     "setup",
@@ -130,6 +132,7 @@ const KEYS: [&str; 13] = [
     "fixed",
     "direction",
     "sigma",
+    "instrument",
 ];
 
 /// Words behind `# measurement:`.
@@ -172,6 +175,7 @@ impl Draft {
             gravity_w: None,
             sigma: None,
             direction_w: None,
+            instrument: None,
         };
         let fixed = vec![None; machine.commands().len()];
         Draft {
@@ -253,6 +257,10 @@ impl Draft {
             "direction" => {
                 entry.no_unit()?;
                 header.direction_w = Some(entry.unit_vector()?);
+            }
+            "instrument" => {
+                entry.no_unit()?;
+                header.instrument = Some(entry.value.to_string());
             }
             _ => {
                 let unit = entry.unit(&[Length, Angle])?;

@@ -3,6 +3,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod browser;
+mod calls;
 mod cli;
 mod compare;
 mod compensate;

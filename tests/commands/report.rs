@@ -85,6 +85,8 @@ fn a_calibration_has_its_page_with_the_figures_of_the_json() {
     let folder = Folder::new("page_of_calibrate");
     let rec = ballbar(&folder);
     let [report, result, file] = ["page.html", "result.json", "found.ron"].map(|name| folder.path(name));
+    let with_name = std::fs::read_to_string(&rec).expect("a recording");
+    std::fs::write(&rec, format!("# instrument: ballbar <4711>, 0.1 um\n{with_name}")).expect("written");
     let text = done(&["calibrate", MACHINE, &rec, "--report", &report, "--json", &result, "-o", &file]);
     assert!(text.starts_with("The machine is ") && text.contains("report written to "), "{text}");
     let page = std::fs::read_to_string(&report).expect("a page");
@@ -107,6 +109,7 @@ fn a_calibration_has_its_page_with_the_figures_of_the_json() {
     for error in found["location_errors"]["errors"].as_array().expect("a list") {
         assert!(has(&page, &error["value"]), "{}", error["name"]);
     }
+    assert!(section(&page, "Files").contains("ballbar &lt;4711&gt;, 0.1 um: distance, 100 mm"));
     let sections =
         ["What to do", "Before and after", "Circular tests", "Residuals against time", "What to enter"];
     let further = ["What could not be seen", "The next measurement", "The machine", "Files"];
@@ -121,6 +124,44 @@ fn a_calibration_has_its_page_with_the_figures_of_the_json() {
     for number in numbers.iter().filter(|number| !number["value"].is_null()) {
         assert!(page.contains(number["name"].as_str().expect("a name")), "{number}");
     }
+}
+
+/// What stands between the head of this section and the next one.
+fn section<'a>(page: &'a str, name: &str) -> &'a str {
+    let behind = page.split_once(&format!("<h2>{name}</h2>")).expect("the section").1;
+    behind.split("<h2>").next().unwrap_or_default()
+}
+
+#[test]
+fn what_a_report_calls_not_identified_it_does_not_enter() {
+    let folder = Folder::new("page_that_agrees");
+    let [report, result, rec] = ["page.html", "result.json", "rec.csv"].map(|name| folder.path(name));
+    // Cones and a plane; one of them leaves a little of the place of C where it sees nothing at all. Poses see everything.
+    let cone = "BK4 --length 100mm --step 3deg --lead 60deg --sense both";
+    let bars = [cone, "BK4 --length 100mm --step 3deg", "BK1 --length 100mm --step 3deg"];
+    let (mut held, mut entered) = (0, 0);
+    for test in bars.into_iter().chain(["poses --count 100 --measure position"]) {
+        let call = ["simulate", MACHINE, "-o", &rec, "--random", "1", "--noise", "0.5um", "--test"];
+        done(&call.into_iter().chain(test.split(' ')).collect::<Vec<_>>());
+        done(&["calibrate", MACHINE, &rec, "--report", &report, "--json", &result]);
+        let page = std::fs::read_to_string(&report).expect("a page");
+        let to_enter = section(&page, "What to enter");
+        let found = json(&result);
+        for error in found["location_errors"]["errors"].as_array().expect("a list") {
+            let name = error["name"].as_str().expect("a name");
+            // The same place, as HEIDENHAIN has it: `c.X` is `EX0C`.
+            let place = |axis: char| format!("{}.{}", name[3..].to_lowercase(), axis);
+            let also = name.chars().nth(1).filter(|axis| "XYZ".contains(*axis)).map(place);
+            for name in also.as_deref().into_iter().chain([name]) {
+                let is_entered = to_enter.contains(&format!(">{name}</td>"));
+                let identified = error["identified"].as_bool().expect("yes or no");
+                assert!(identified || !is_entered, "{test}: {name} of {error}");
+                held += u32::from(!identified);
+                entered += u32::from(is_entered);
+            }
+        }
+    }
+    assert!(held > 20 && entered > 12, "{held}, {entered}");
 }
 
 #[test]

@@ -54,6 +54,13 @@ fn a_folder_in_the_place_of_a_file_is_told_with_its_mend() {
 fn messages_point_at_the_token_at_fault() {
     let expected = [
         ("zero_axis", "(0, 0, 0), travel"),
+        ("dh_beside_tool", "("),
+        ("dh_limits_reversed", "(60, -100)"),
+        ("dh_sign_of_two", "2)"),
+        ("dh_joint_named_twice", "\"q1\", a: 440"),
+        ("dh_number_too_large", "1e300, alpha"),
+        ("dh_tool_too_far", "Tz(1e300)"),
+        ("dh_follows_an_unknown_joint", "1}"),
         ("axis_not_of_length_one", "(0, 1, 1), travel"),
         ("unknown_axis_word", "\"up\""),
         ("missing_w", "\"work\""),

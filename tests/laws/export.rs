@@ -70,6 +70,26 @@ fn a_urdf_file_read_back_is_the_same_machine() {
 }
 
 #[test]
+fn tags_of_a_base_file_that_say_where_a_switch_is_stay() {
+    const TAG: &str = "<calibration rising=\"0.25\"/>";
+    let text = std::fs::read_to_string(folder("tests/urdf/arm.urdf")).expect("a text");
+    assert!(text.contains("</joint>") && !text.contains("<calibration"));
+    let text = text.replace("</joint>", &format!("{TAG}</joint>"));
+    let ends = Ends::default().with_tip("finger");
+    let machine = read("arm.urdf", &text, &ends).expect("sound").machine;
+    let deviations = deviations(machine.dyads().len(), &mut Random::new(8));
+    let calibrated = CalibratedMachine::nominal(machine).with_deviations(deviations);
+    let base = BaseFile::new("arm.urdf", text.clone(), ends);
+    let exported =
+        export(&calibrated, Format::Urdf, &ExportOptions::default().with_base_file(base)).expect("a file");
+    assert_ne!(exported.text, text);
+    assert_eq!(exported.text.matches(TAG).count(), text.matches(TAG).count());
+    // And a new file has none.
+    let new = export(&calibrated, Format::Urdf, &ExportOptions::default()).expect("a file");
+    assert!(!new.text.contains("calibration rising"));
+}
+
+#[test]
 fn a_base_file_keeps_every_byte_but_its_origins() {
     let path = folder("tests/urdf/arm.urdf");
     let ends = Ends::default().with_tip("finger");

@@ -119,3 +119,77 @@ fn headings_as_textbooks_have_them_are_understood() {
     let error = read_with("arm.csv", &before, &as_dh()).expect_err("standard");
     assert!(error.to_string().contains("--mdh") && error.mend().contains("--mdh"), "{error}");
 }
+
+/// A table as the block `dh` of a machine file in mm and deg.
+fn block(convention: &str, rest: &str, rows: &[&str]) -> Machine {
+    let rows = rows.join("), (");
+    let text = format!(
+        "Machine(name: \"arm\", units: (length: mm, angle: deg), dh: (convention: {convention}, rows: [({rows})]{rest}))"
+    );
+    Machine::parse("arm.ron", &text).expect("a machine")
+}
+
+#[test]
+fn a_block_in_a_machine_file_is_the_machine_of_the_table() {
+    let pi = |angle: f64| (angle / std::f64::consts::PI * 180.0).to_string();
+    let panda = [
+        format!("d: 333, a: 0, alpha: 0, travel: (-{0}, {0})", pi(2.8973)),
+        format!("a: 0, alpha: -90, travel: (-{0}, {0})", pi(1.7628)),
+        format!("d: 316, a: 0, alpha: 90, travel: (-{0}, {0})", pi(2.8973)),
+        format!("a: 82.5, alpha: 90, travel: (-{}, -{})", pi(3.0718), pi(0.0698)),
+        format!("d: 384, a: -82.5, alpha: -90, travel: (-{0}, {0})", pi(2.8973)),
+        format!("a: 0, alpha: 90, travel: (-{}, {})", pi(0.0175), pi(3.7525)),
+        format!("a: 88, alpha: 90, travel: (-{0}, {0})", pi(2.8973)),
+    ];
+    let panda: Vec<&str> = panda.iter().map(String::as_str).collect();
+    let puma = [
+        "a: 0, alpha: 90, travel: (-160, 160)",
+        "a: 431.8, alpha: 0, travel: (-45, 225)",
+        "d: 150.05, a: 20.3, alpha: -90, travel: (-225, 45)",
+        "d: 431.8, a: 0, alpha: 90, travel: (-110, 170)",
+        "a: 0, alpha: -90, travel: (-100, 100)",
+        "a: 0, alpha: 0, travel: (-266, 266)",
+    ];
+    let gantry = [
+        r#"joint: "lift", kind: prismatic, sign: -1, offset: 20, d: 500, a: 100, alpha: -90"#,
+        r#"joint: "turn", sign: -1, offset: 30, theta: -15, d: 40, a: 0, alpha: 0"#,
+    ];
+    let base = ", base: [Tx(100), Ty(200), Tz(300), Rz(90)]";
+    let pairs = [
+        (
+            block("modified", ", tool: [Tz(240.4), Rz(-45)]", &panda),
+            open(table("panda.csv"), &Ends::default()),
+        ),
+        (block("classic", "", &puma), open_with(table("puma560.csv"), &as_dh())),
+        (block("standard", base, &gantry), open(table("gantry.csv"), &Ends::default())),
+    ];
+    for (machine, imported) in pairs {
+        let imported = imported.expect("a table").machine;
+        assert_eq!(machine.commands(), imported.commands());
+        for (i, at) in [0.0, 0.4, -1.3].into_iter().enumerate() {
+            let q: Vec<f64> =
+                (0..machine.commands().len()).map(|c| at * (1.0 - 0.3 * c as f64) + 0.1 * i as f64).collect();
+            same(Chain::nominal(&machine).w_from_t(&q), Chain::nominal(&imported).w_from_t(&q));
+        }
+        for c in 0..machine.commands().len() {
+            let (own, of_table) = (machine.travel(c), imported.travel(c));
+            let near = |a: f64, b: f64| a == b || (a - b).abs() < 1e-14;
+            assert!(near(own.0, of_table.0) && near(own.1, of_table.1), "{own:?} {of_table:?}");
+        }
+        // Written and read again it stands where it stood, frame by frame.
+        let again = Machine::parse("again.ron", &machine.to_ron()).expect("a machine");
+        assert_eq!(again, machine);
+    }
+}
+
+#[test]
+fn a_block_may_stand_beside_what_carries_the_workpiece() {
+    let text = r#"Machine(name: "cell", units: (length: mm, angle: deg),
+        workpiece: [(frame: "table", at: (800, 0, 0), joint: Revolute(axis: "z")), (frame: "w", at: (0, 0, 30))],
+        dh: (convention: modified, rows: [(a: 0, alpha: 0, d: 300), (a: 200, alpha: 0)]))"#;
+    let machine = Machine::parse("cell.ron", text).expect("a machine");
+    assert_eq!(machine.commands(), ["table", "q1", "q2"]);
+    let pose = Chain::nominal(&machine).w_from_t(&[0.0, std::f64::consts::FRAC_PI_2, 0.3]);
+    let expected = Vec3([-0.8, 0.2, 0.27]);
+    assert!((pose.translation - expected).norm() < 1e-15, "{pose:?}");
+}

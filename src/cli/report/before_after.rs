@@ -54,7 +54,7 @@ fn of_quantity(figures: &[Figures], stages: &[&'static str], all: &[Rms], angle:
 /// One bar for each model.
 fn bars(totals: &[Option<f64>], stages: &[&'static str], unit: Shown) -> Markup {
     const WIDTH: f64 = 520.0;
-    const ROW: f64 = 46.0;
+    const ROW: f64 = 48.0;
     let most = largest(totals.iter().flatten().copied()).max(f64::MIN_POSITIVE);
     let shown: Vec<(usize, f64)> = totals.iter().enumerate().filter_map(|(k, x)| Some((k, (*x)?))).collect();
     let value = |x: f64| {
@@ -70,9 +70,9 @@ fn bars(totals: &[Option<f64>], stages: &[&'static str], unit: Shown) -> Markup 
                 desc { (told.join("; ")) "." }
                 @for (i, (k, x)) in shown.iter().enumerate() {
                     @let y = ROW * i as f64;
-                    text x="0" y=(y + 16.0) { (stages[*k]) }
-                    text x=(WIDTH) y=(y + 16.0) text-anchor="end" { (value(*x)) }
-                    rect class=(format!("bar {}", ink_of(*k).class())) x="0" y=(y + 22.0)
+                    text x="0" y=(y + 19.0) { (stages[*k]) }
+                    text x=(WIDTH) y=(y + 19.0) text-anchor="end" { (value(*x)) }
+                    rect class=(format!("bar {}", ink_of(*k).class())) x="0" y=(y + 25.0)
                         width=(format!("{:.1}", (WIDTH * x / most).max(1.0))) height="14" rx="2" {}
                 }
             }

@@ -5,12 +5,12 @@ use std::fmt::Write;
 
 use maud::{Markup, html};
 
-/// Outer size and the margins around the frame, in the picture's own units. Letters are up to 17 units high on a phone.
+/// Outer size and the margins around the frame, in the picture's own units. Letters are up to 20 units high on a phone.
 const SIZE: (f64, f64) = (520.0, 260.0);
-const LEFT: f64 = 62.0;
+const LEFT: f64 = 70.0;
 const RIGHT: f64 = 12.0;
-const TOP: f64 = 28.0;
-const BOTTOM: f64 = 48.0;
+const TOP: f64 = 30.0;
+const BOTTOM: f64 = 50.0;
 
 /// What something is drawn as: the class of its colour.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -187,7 +187,7 @@ impl Plot {
                 }
                 @for tick in &x_ticks {
                     line.grid x1=(at(x(*tick))) x2=(at(x(*tick))) y1=(TOP) y2=(bottom) {}
-                    text x=(at(x(*tick))) y=(bottom + 17.0) text-anchor="middle" { (numeral(*tick, x_decimals)) }
+                    text x=(at(x(*tick))) y=(bottom + 18.0) text-anchor="middle" { (numeral(*tick, x_decimals)) }
                 }
                 @for tick in &y_ticks {
                     line class=(if *tick == 0.0 { "zero" } else { "grid" })
@@ -197,7 +197,7 @@ impl Plot {
                 @for layer in &self.layers { (draw_marks(layer, &x, &y)) }
                 rect.frame x=(LEFT) y=(TOP) width=(right - LEFT) height=(bottom - TOP) {}
                 text.t x=(at(right)) y=(SIZE.1 - 7.0) text-anchor="end" { (self.x_label) }
-                text.t x="4" y="17" { (self.y_label) }
+                text.t x="4" y="20" { (self.y_label) }
             }
         })
     }

@@ -65,7 +65,8 @@ pub(super) fn provenance(sources: &[Source], recordings: &[Recording], command: 
 /// What a recording says of its instrument.
 fn instrument(recording: &Recording) -> String {
     let header = recording.header();
-    let mut text = header.measurement.word().to_string();
+    let named = header.instrument.as_ref();
+    let mut text = named.map_or_else(String::new, |name| format!("{name}: ")) + header.measurement.word();
     if let crate::recording::NominalLength::Known(length) = header.nominal_length {
         text += &format!(", {} mm", 1e3 * length);
     }

@@ -17,7 +17,7 @@ const CIRCLE: f64 = 0.08;
 /// A machine whose frames all lie in one point is drawn this large, m.
 const ALONE: f64 = 0.2;
 /// Labels keep this far from each other.
-const APART: f64 = 15.0;
+const APART: f64 = 19.0;
 
 /// The section: picture and table of frames.
 pub(super) fn skeleton(machine: &Machine) -> Markup {

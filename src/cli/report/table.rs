@@ -4,11 +4,20 @@ use maud::{Markup, html};
 
 use crate::cli::output::{Shown, decimals};
 
+/// A word of more letters may be broken anywhere: a screen of 800 px has room for a table with one of so many.
+const LONG: usize = 32;
+
 /// What stands in a cell.
 pub(super) struct Cell {
     text: String,
     /// By what it is sorted, where that is a number: SI.
     value: Option<f64>,
+}
+
+impl Cell {
+    fn is_long(&self) -> bool {
+        self.text.split_whitespace().any(|word| word.chars().count() > LONG)
+    }
 }
 
 /// A word.
@@ -86,7 +95,7 @@ pub(super) fn table(heads: &[&str], rows: Vec<Vec<Cell>>) -> Markup {
                     @for row in &rows { tr {
                         @for c in &columns {
                             @if let Some(cell) = row.get(*c) {
-                                td class=[numeric[*c].then_some("n")] data-h=(heads[*c])
+                                td class=[numeric[*c].then_some("n").or(cell.is_long().then_some("long"))] data-h=(heads[*c])
                                     data-v=[cell.value.filter(|v| v.is_finite()).map(|v| format!("{v:e}"))] { (cell.text) }
                             }
                         }
