@@ -112,7 +112,7 @@ impl Engine {
         let own = self.scratch.join(format!("{}-proposed", case.label));
         std::fs::create_dir_all(&own).map_err(|e| format!("{}: {e}", own.display()))?;
         let judge = case.judge.as_ref().ok_or("the case has no path to be judged on")?;
-        let (model, json, new) = (own.join("model.ron"), own.join("model.json"), own.join("new.ron"));
+        let (model, json, new) = (own.join("model.ron"), own.join("said.json"), own.join("new.ron"));
         let without: Vec<&str> = left_out.iter().flat_map(|name| ["--without", name]).collect();
         let error = |more: &[&dyn AsRef<std::ffi::OsStr>]| {
             let mut arguments: Vec<&dyn AsRef<std::ffi::OsStr>> = vec![&"diagnose", &case.machine];
