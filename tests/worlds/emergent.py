@@ -158,6 +158,7 @@ def lying(machine):
 
 
 def attempt(rng, kind, machines):
+    """A case of this kind on a machine that is drawn; None where too little of it, or too much, would be seen."""
     sort, on = kind.split(" on ")
     machine = machines[on][int(rng.integers(len(machines[on])))]
     if on == "turns":
