@@ -64,6 +64,9 @@ impl Search<'_> {
         let mut hypotheses: Vec<Hypothesis> = (all.into_par_iter())
             .filter_map(|i| {
                 let score = rows.screen(i, &candidates[i], &field, overdispersion)?;
+                if !score.is_small(&candidates[i]) {
+                    return None;
+                }
                 Some(Hypothesis::new(i, score.evidence + priors[i], score))
             })
             .collect();

@@ -139,6 +139,19 @@ pub(super) fn best(
     Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room, is_faint }
 }
 
+impl Score {
+    /// How many times the usual size it is, from one on.
+    pub fn times_usual(&self) -> f64 {
+        if self.room > ROOM { self.room / ROOM_BEYOND } else { 1.0 }
+    }
+
+    /// Whether what it moves is a small twist: beyond one radian or metre there is nothing linear.
+    pub fn is_small(&self, candidate: &Candidate) -> bool {
+        let of_size = candidate.coefficients[..self.coefficients].iter().map(|coefficient| coefficient.size);
+        of_size.fold(0.0, f64::max) * self.times_usual() < 1.0
+    }
+}
+
 /// Candidate at one point of its grid.
 #[derive(Clone, Debug)]
 pub(super) struct Best {

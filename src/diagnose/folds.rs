@@ -117,7 +117,8 @@ pub(super) fn are_better(search: &Search, these: &[ModelTerm], others: &[ModelTe
 }
 
 /// Which part of the squares of left-out stretches is left with all effects, against what the first of them leave, the noise's own taken from
-/// both; each quantity in units of its mean with these. `None` where there are too few rows, or nothing but noise.
+/// both; of lengths or of angles, whichever fall by the larger part: what shifts a frame turns nothing. `None` where there are too few rows, or
+/// nothing but noise.
 pub(super) fn remaining(
     search: &Search,
     noise: &[Noise],
@@ -125,22 +126,22 @@ pub(super) fn remaining(
     first: usize,
 ) -> Option<f64> {
     let folds = Folds::new(search, in_model)?;
-    let before = folds.left_out(search, &|effect| effect < first);
-    let (fall, _) = folds.fall(search, &before, &folds.left_out(search, &|_| true));
-    let used = |row: &usize| !search.rows.whitener.out[*row];
-    let all = (0..before.len()).filter(used).count() as f64;
-    let mut of_noise = 0.0;
+    let (without, with) =
+        (folds.left_out(search, &|effect| effect < first), folds.left_out(search, &|_| true));
+    let mut of_noise = vec![0.0; without.len()];
     // Of settled positions nothing tells the noise but what is left. What remembers for long may be a misfit.
-    if search.in_motion {
-        let means = folds.means(search, &before, &|_| true);
-        let mean = |row: usize| if search.rows.linear.angle[row] { means.rad } else { means.m };
-        for (run, noise) in search.runs.iter().zip(noise) {
-            let variance = noise.shortened().sigma.powi(2);
-            let rows = run.iter().filter(|row| used(row));
-            of_noise += rows.map(|row| variance / mean(*row)).sum::<f64>();
-        }
+    for (run, noise) in search.runs.iter().zip(noise).filter(|_| search.in_motion) {
+        run.iter().for_each(|row| of_noise[*row] = noise.shortened().sigma.powi(2));
     }
-    (all > of_noise).then(|| 1.0 - fall / (all - of_noise))
+    let of = |angle: bool| {
+        let counts = |row: &usize| !search.rows.whitener.out[*row] && search.rows.linear.angle[*row] == angle;
+        let sum = |of_row: &dyn Fn(usize) -> f64| (0..without.len()).filter(counts).map(of_row).sum::<f64>();
+        let before = sum(&|row| without[row].powi(2));
+        let (fall, noise) = (before - sum(&|row| with[row].powi(2)), sum(&|row| of_noise[row]));
+        (before > noise).then(|| (fall / before, 1.0 - fall / (before - noise)))
+    };
+    let most = [of(false), of(true)].into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+    most.map(|(_, left)| left)
 }
 
 /// Whether stretches that are left out are foretold better without one of these effects, (68): a patch.

@@ -105,8 +105,8 @@ pub(super) fn report(
     let told: Vec<Told> = (told.into_iter().zip(placebos).zip(kept))
         .map(|(((_, finding, named), placebo), term)| Told { term, finding, named, placebo })
         .collect();
-    // Names that explain most of what is there stand; what they leave may be foretold all the same.
-    let is_rest = doubt.is_none() && !told.is_empty() && shares.left.beyond > CHANCE;
+    // Names that explain most of what is there stand; what they leave may be foretold all the same. Of settled positions no block tells it.
+    let is_rest = doubt.is_none() && (shares.left.beyond > CHANCE || !search.in_motion);
     let findings = Findings { told, shared_effects, shares, doubt, is_rest, is_proved };
     let given = (machine, library, facts);
     let (plain, _) = findings.with_parts(search, given, noise, None, propose);

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::cells::CellSums;
 use super::coarse::Coarse;
 use super::equations::{
-    BATCH, Best, Column, Equations, Key, ROOM, ROOM_BEYOND, Score, best, judge, key, lengths, unit_size,
+    BATCH, Best, Column, Equations, Key, ROOM, Score, best, judge, key, lengths, unit_size,
 };
 use super::evidence::{log_mean_exp, rarity, sizes_up_to};
 use super::features::Features;
@@ -242,9 +242,8 @@ impl<'a> Rows<'a> {
 
     /// Logarithm of how rare its size is, 0 for one that is usual.
     pub fn rarity(&self, candidate: &Candidate, score: &Score) -> f64 {
-        let size = if score.room > ROOM { score.room / ROOM_BEYOND } else { 1.0 };
         let usual = self.usual_sizes(candidate, std::slice::from_ref(&score.parameters));
-        rarity(sizes_up_to(size), usual)
+        rarity(sizes_up_to(score.times_usual()), usual)
     }
 
     /// The best of candidate `i` over its grid, on blocks where that does. `overdispersion`: by how much chance is larger than the noise says.

@@ -31,6 +31,7 @@ mod recovery;
 mod resolvers;
 mod rivals;
 mod set_ups;
+mod settled;
 mod shown_by_one;
 mod side_branches;
 mod smooth_misfit;
