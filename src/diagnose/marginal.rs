@@ -67,9 +67,9 @@ impl Marginal {
         let count = columns.ncols();
         let mut back = DMatrix::identity(count, count);
         factor.l_dirty().solve_lower_triangular_mut(&mut back);
-        self.and(&match count > WIDE && columns.nrows() > WIDE {
-            true => back * turned(beside.as_slice(), beside.shape()),
-            false => back * beside.transpose(),
+        self.and(&match turned(beside.as_slice(), beside.shape()) {
+            Some(turned) => back * turned,
+            None => back * beside.transpose(),
         })
     }
 
@@ -140,15 +140,12 @@ pub(super) fn worth_of(gram: DMatrix<f64>, toward: &DVector<f64>, overdispersion
     0.5 * toward.dot(&factor.solve(&toward)) - factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>()
 }
 
-/// Products of more columns than this, of both factors, go by blocks.
+/// Products of more rows and columns than this, of both factors, go by blocks.
 const WIDE: usize = 5;
 
-/// `aᵀ b` of tall matrices, by blocks that stay in a core's cache; nalgebra's `tr_mul` goes column by column.
+/// `aᵀ b` of tall matrices.
 pub(super) fn gram(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    match a.ncols() > WIDE && b.ncols() > WIDE && a.nrows() > 0 {
-        true => turned(a.as_slice(), a.shape()) * b,
-        false => a.transpose() * b,
-    }
+    turned_times(a.as_slice(), a.shape(), &b.as_view())
 }
 
 /// Columns of `aᵀ a` that are computed at a time, from the diagonal on: half of a symmetric product tells all of it.
@@ -168,20 +165,27 @@ fn symmetric(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut product = DMatrix::zeros(count, count);
     for from in (0..count).step_by(STRIP) {
         let (strip, rest) = (STRIP.min(count - from), count - from);
-        let own = match strip > WIDE {
-            true => turned(&a.as_slice()[from * rows..], (rows, rest)) * b.columns(from, strip),
-            false => a.columns(from, rest).tr_mul(&b.columns(from, strip)),
-        };
+        let own = turned_times(&a.as_slice()[from * rows..], (rows, rest), &b.columns(from, strip));
         product.view_mut((from, from), (rest, strip)).copy_from(&own);
         product.view_mut((from, from), (strip, rest)).tr_copy_from(&own);
     }
     product
 }
 
-/// The transposed of columns that lie one behind the other, without a copy: blocks are packed from them as they lie. Products with no more than
-/// [`WIDE`] rows or columns may not be made of it: nalgebra makes those column by column, as if rows lay one behind the other.
-fn turned(columns: &[f64], (rows, count): (usize, usize)) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
-    MatrixView::from_slice_with_strides_generic(columns, Dyn(count), Dyn(rows), Dyn(rows), Dyn(1))
+/// `aᵀ b`, of `a` the columns as they lie one behind the other: by blocks that stay in a core's cache; nalgebra's `tr_mul` goes column by column.
+fn turned_times(columns: &[f64], shape: (usize, usize), b: &DMatrixView<'_, f64>) -> DMatrix<f64> {
+    match turned(columns, shape).filter(|_| b.ncols() > WIDE) {
+        Some(turned) => turned * b,
+        None => DMatrixView::from_slice(columns, shape.0, shape.1).tr_mul(b),
+    }
+}
+
+/// The transposed of columns that lie one behind the other, without a copy: blocks are packed from them as they lie. `None` of few rows or columns:
+/// products with no more than [`WIDE`] of either nalgebra makes column by column, as if rows lay one behind the other, past the end of what is there.
+fn turned(columns: &[f64], (rows, count): (usize, usize)) -> Option<MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn>> {
+    (rows.min(count) > WIDE).then(|| {
+        MatrixView::from_slice_with_strides_generic(columns, Dyn(count), Dyn(rows), Dyn(rows), Dyn(1))
+    })
 }
 
 /// Coefficients from normal equations, with their prior.
@@ -206,6 +210,21 @@ mod tests {
         let exact = full.lu().solve(&x).expect("regular");
         assert!((&at_once - &exact).amax() < 1e-9, "{}", (&at_once - &exact).amax());
         assert!((&in_turn - &exact).amax() < 1e-9);
+    }
+
+    #[test]
+    fn products_of_few_rows_or_columns_are_those_of_many() {
+        let matrix = |rows, columns| {
+            DMatrix::from_fn(rows, columns, |i, k| (1.0 + i as f64 * 0.7 + k as f64 * 1.9).sin())
+        };
+        for (rows, a, b) in
+            (0..9).flat_map(|rows| (1..9).flat_map(move |a| (1..9).map(move |b| (rows, a, b))))
+        {
+            let (one, other) = (matrix(rows, a), matrix(rows, b));
+            let sum = |i: usize, k: usize| one.column(i).dot(&other.column(k));
+            let exact = DMatrix::from_fn(a, b, sum);
+            assert!((gram(&one, &other) - exact).amax() < 1e-12, "{rows} rows, {a} and {b} columns");
+        }
     }
 
     #[test]
