@@ -64,6 +64,8 @@ pub(crate) struct CalibrationForm {
     error_motions: Vec<MotionForm>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     unseen: Option<Vec<Vec<DeviationForm>>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    unseen_at_all: Option<Vec<Vec<DeviationForm>>>,
 }
 
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -135,6 +137,8 @@ pub struct CalibratedMachine {
     seen: Vec<Option<(f64, f64)>>,
     /// Patterns of deviations that may be there as well.
     pub(crate) unseen: Option<Vec<Vec<Twist<f64>>>>,
+    /// Those that no recording sees at all, where `unseen` does not tell them by their length.
+    pub(crate) unseen_at_all: Option<Vec<Vec<Twist<f64>>>>,
     samples: u64,
     rms: Rms,
     variation: Variation,
@@ -158,6 +162,7 @@ impl CalibratedMachine {
             lengths: Vec::new(),
             seen: vec![None; commands],
             unseen: None,
+            unseen_at_all: None,
             samples: 0,
             rms: Rms::default(),
             variation: Variation::default(),
@@ -291,11 +296,15 @@ impl CalibratedMachine {
     fn fill(&mut self, form: &CalibrationForm) -> Checked<()> {
         let units = self.machine.units();
         self.deviations = deviations(&self.machine, "calibration.deviations", &form.deviations)?;
-        let pattern = |(i, pattern): (usize, &Vec<DeviationForm>)| {
-            deviations(&self.machine, &format!("calibration.unseen[{i}]"), pattern)
+        let patterns = |name: &str, all: &Vec<Vec<DeviationForm>>| -> Checked<Vec<Vec<Twist<f64>>>> {
+            let pattern = |(i, pattern): (usize, &Vec<DeviationForm>)| {
+                deviations(&self.machine, &format!("calibration.{name}[{i}]"), pattern)
+            };
+            all.iter().enumerate().map(pattern).collect()
         };
-        let unseen = form.unseen.as_ref().map(|all| all.iter().enumerate().map(pattern).collect());
-        self.unseen = unseen.transpose()?;
+        let unseen = form.unseen.as_ref().map(|all| patterns("unseen", all)).transpose()?;
+        let at_all = form.unseen_at_all.as_ref().map(|all| patterns("unseen_at_all", all)).transpose()?;
+        (self.unseen, self.unseen_at_all) = (unseen, at_all);
         for (i, setup) in form.setups.iter().enumerate() {
             let path = format!("calibration.setups[{i}]");
             let placement = Placement {
@@ -363,7 +372,7 @@ impl CalibratedMachine {
             forms.retain(|d| d.v != (0.0, 0.0, 0.0) || d.w != (0.0, 0.0, 0.0));
             forms
         };
-        let unseen = self.unseen.as_ref().map(|all| all.iter().map(pattern).collect());
+        let patterns = |all: &Vec<Vec<Twist<f64>>>| all.iter().map(pattern).collect();
         let place = |(name, pose): &(String, Pose<f64>)| PlaceForm {
             name: name.clone(),
             at: in_unit(pose.translation, units.length),
@@ -408,7 +417,8 @@ impl CalibratedMachine {
             clock: self.clock,
             effects: self.effects.clone(),
             error_motions: error_motion::forms(&self.machine, &self.variation.motions),
-            unseen,
+            unseen: self.unseen.as_ref().map(patterns),
+            unseen_at_all: self.unseen_at_all.as_ref().map(patterns),
         });
         to_text(&form)
     }

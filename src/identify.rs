@@ -208,7 +208,8 @@ fn identify(
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
     let information = Info::new(&found.solution.normal.matrix, layout, prior, open);
     let mut calibrated = calibrated(machine, &sources, &found);
-    calibrated.unseen = Some(unseen::unseen(machine, layout, &information));
+    let open = unseen::unseen(machine, layout, &information);
+    (calibrated.unseen, calibrated.unseen_at_all) = (Some(open.patterns), open.at_all);
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;
     let unknowns = &found.solution.unknowns;
     if !varying.is_constant() || problem.motions.len() > 0 {

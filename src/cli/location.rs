@@ -33,5 +33,8 @@ pub(crate) fn render_location_errors(found: &LocationErrors) -> String {
         })
         .collect();
     text.push_str(&table("  ", &[false, true, false, true, false], &rows));
+    if let Some(caution) = found.caution() {
+        let _ = writeln!(text, "  {caution}");
+    }
     text
 }

@@ -19,7 +19,7 @@ pub(crate) struct Args {
     /// A copy of a machine that comes with the program; `kincal machines` lists them
     #[arg(long, value_name = "NAME", group = "from")]
     like: Option<String>,
-    /// A table of joints: name, kind, carries, direction, point[mm], and limits as lower[mm], upper[mm], lower[deg], upper[deg]
+    /// A table of joints: name, kind, carries, direction, point[mm], and limits as lower[mm], upper[mm], lower[deg], upper[deg]; in rows `t` and `w` the points of the tool tip and of the workpiece's origin
     #[arg(long, value_name = "JOINTS.csv", group = "from")]
     joints: Option<PathBuf>,
     /// A joint, from the base outwards; once for each: name, kind, carries, direction and a point of its axis in mm, with semicolons between

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::control::{Seen, common, square, unit};
-use super::numbers::{MM, fixed, heading};
+use super::numbers::{MM, fixed, heading, left_open};
 use super::{ExportOptions, Exported, Number, iso230};
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
@@ -32,12 +32,8 @@ pub(super) fn write(calibrated: &CalibratedMachine, options: &ExportOptions) -> 
         for k in (0..3).filter(|k| k != axis) {
             let i = 3 * n + k;
             let (value, was) = (values[i], declared[i]);
-            let because = (!verdicts[i].is_determined()).then(|| {
-                format!(
-                    "the recordings leave it open: it may be off by {} mm (one standard deviation)",
-                    fixed(verdicts[i].open * MM.per_si)
-                )
-            });
+            let is_open = !verdicts[i].is_determined();
+            let because = is_open.then(|| left_open(verdicts[i].open * MM.per_si, MM.symbol));
             let name = format!("{},{}", seen.layout.names[*line], ["X", "Y", "Z"][k]);
             let change = value - was;
             let note = match &because {

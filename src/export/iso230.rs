@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::known::Known;
-use super::numbers::{UM, URAD, exact, fixed, heading};
+use super::numbers::{UM, URAD, exact, fixed, heading, left_open};
 use super::varying::varying;
 use super::{Exported, Number, refused};
 use crate::calibration::CalibratedMachine;
@@ -42,13 +42,7 @@ pub(super) fn write(calibrated: &CalibratedMachine) -> Result<Exported> {
         let unit = if offset { UM } else { URAD };
         let determined = known.determines(error);
         let value = determined.then_some(error.value * unit.per_si);
-        let because = (!determined).then(|| {
-            format!(
-                "the recordings leave it open: it may be off by {} {} (one standard deviation)",
-                fixed(error.std_error * unit.per_si),
-                unit.symbol
-            )
-        });
+        let because = (!determined).then(|| left_open(error.std_error * unit.per_si, unit.symbol));
         let meaning = match (
             offset,
             error.name.contains("0C") || error.name.contains("0A") || error.name.contains("0B"),

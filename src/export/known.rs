@@ -4,14 +4,12 @@ use super::travel::poses;
 use crate::calibration::CalibratedMachine;
 use crate::chain::Chain;
 use crate::lie::Twist;
-use crate::location::{Functional, IDENTIFIED, Knowledge, LISTED, LocationError};
+use crate::location::{Functional, IDENTIFIED, Knowledge, LISTED, LocationError, UNSEEN};
+use crate::machine::Machine;
 
 /// No more than this part of the variance that the tolerances allow may lie along what the file lists as unseen: with what it need not
 /// list, [`LISTED`], the data's share is still [`IDENTIFIED`]. A tenth of the tolerances as a standard deviation.
 const OPEN: f64 = 1.0 - IDENTIFIED - LISTED;
-
-/// A pattern of which the data bring no more than this part is one that they do not see at all.
-const NOTHING: f64 = 1e-6;
 
 /// What a number changes by less is rounding, in its own unit.
 const ROUNDING: f64 = 1e-11;
@@ -19,6 +17,8 @@ const ROUNDING: f64 = 1e-11;
 /// What the file says of what its recordings have not seen.
 pub(super) struct Known<'a> {
     calibrated: &'a CalibratedMachine,
+    /// Patterns that the recordings do not see at all.
+    unseen_at_all: Vec<&'a [Twist<f64>]>,
 }
 
 /// How sure a number is.
@@ -42,7 +42,16 @@ fn may_be_entered(identified: bool, share: f64) -> bool {
 
 impl<'a> Known<'a> {
     pub fn new(calibrated: &'a CalibratedMachine) -> Self {
-        Known { calibrated }
+        // Of a pattern that is one standard deviation long, its length in tolerances says how much the data bring.
+        let is_whole = |pattern: &[Twist<f64>]| {
+            scaled(calibrated.machine(), pattern).map(|x| x * x).sum::<f64>() >= 1.0 - UNSEEN
+        };
+        let told = calibrated.unseen().unwrap_or_default().iter().map(Vec::as_slice);
+        let unseen_at_all = match &calibrated.unseen_at_all {
+            Some(listed) => listed.iter().map(Vec::as_slice).collect(),
+            None => told.filter(|pattern| is_whole(pattern)).collect(),
+        };
+        Known { calibrated, unseen_at_all }
     }
 
     /// Whether the file says anything of it at all.
@@ -87,17 +96,16 @@ impl<'a> Known<'a> {
                 allowed.iter_mut().zip(changes).for_each(|(sum, change)| *sum += change * change);
             }
         }
-        let patterns = self.calibrated.unseen().unwrap_or_default();
-        let changes: Vec<Vec<f64>> = patterns
-            .iter()
-            .map(|pattern| {
-                let mut by = pattern.clone();
-                by[machine.w_index()] = Twist::zero(0.0);
-                half_change(&by)
-            })
-            .collect();
+        let change = |pattern: &[Twist<f64>]| {
+            let mut by = pattern.to_vec();
+            by[machine.w_index()] = Twist::zero(0.0);
+            half_change(&by)
+        };
+        let open: Vec<Vec<f64>> = self.patterns().map(change).collect();
+        let at_all: Vec<Vec<f64>> = self.unseen_at_all.iter().map(|pattern| change(pattern)).collect();
         let verdict = |(i, allowed): (usize, f64)| {
-            let known = self.functional(allowed, changes.iter().map(|changes| changes[i]));
+            let of = |changes: &[Vec<f64>]| changes.iter().map(|changes| changes[i].powi(2)).sum();
+            let known = functional(allowed, of(&open), of(&at_all));
             let open = known.posterior_variance;
             let may = || may_be_entered(known.is_identified(), known.share());
             Verdict { open: open.sqrt(), determined: open <= ROUNDING * ROUNDING || may() }
@@ -105,38 +113,35 @@ impl<'a> Known<'a> {
         allowed.into_iter().enumerate().map(verdict).collect()
     }
 
-    /// What is known of a function, from its changes by each pattern.
-    fn functional(&self, prior_variance: f64, changes: impl Iterator<Item = f64>) -> Functional {
-        let (mut open, mut unseen) = (0.0, 0.0);
-        for (pattern, change) in self.calibrated.unseen().unwrap_or_default().iter().zip(changes) {
-            let square = change * change;
-            open += square;
-            // Of a pattern that is one standard deviation long, its length in tolerances says how much the data bring.
-            if self.scaled(pattern).map(|x| x * x).sum::<f64>() >= 1.0 - NOTHING {
-                unseen += square;
-            }
-        }
-        let unseen = if prior_variance > 0.0 { unseen / prior_variance } else { 0.0 };
-        Functional { prior_variance, posterior_variance: open, unseen }
+    /// Patterns that the recordings left open.
+    fn patterns(&self) -> impl Iterator<Item = &'a [Twist<f64>]> {
+        self.calibrated.unseen().unwrap_or_default().iter().map(Vec::as_slice)
     }
+}
 
-    /// The components of a pattern in units of their tolerances.
-    fn scaled<'p>(&'p self, pattern: &'p [Twist<f64>]) -> impl Iterator<Item = f64> + 'p {
-        let machine = self.calibrated.machine();
-        pattern.iter().enumerate().flat_map(move |(j, dh)| {
-            let tolerances = machine.tolerance(j).to_array();
-            dh.to_array().into_iter().zip(tolerances).map(|(x, tolerance)| x / tolerance)
-        })
-    }
+/// What is known of a function, from its variances along what the recordings left open and along what they do not see at all.
+fn functional(prior_variance: f64, open: f64, at_all: f64) -> Functional {
+    let unseen = if prior_variance > 0.0 { at_all / prior_variance } else { 0.0 };
+    Functional { prior_variance, posterior_variance: open, unseen }
+}
+
+/// The components of a pattern in units of their tolerances.
+fn scaled(machine: &Machine, pattern: &[Twist<f64>]) -> impl Iterator<Item = f64> {
+    pattern.iter().enumerate().flat_map(move |(j, dh)| {
+        let tolerances = machine.tolerance(j).to_array();
+        dh.to_array().into_iter().zip(tolerances).map(|(x, tolerance)| x / tolerance)
+    })
 }
 
 impl Knowledge for Known<'_> {
     fn of_deviations(&self, by_dyad_scaled: &[f64]) -> Functional {
-        let along = |pattern: &Vec<Twist<f64>>| -> f64 {
-            self.scaled(pattern).zip(by_dyad_scaled).map(|(x, g)| x * g).sum()
+        let square = |pattern: &[Twist<f64>]| -> f64 {
+            let parts = scaled(self.calibrated.machine(), pattern).zip(by_dyad_scaled);
+            parts.map(|(x, g)| x * g).sum::<f64>().powi(2)
         };
         let prior_variance: f64 = by_dyad_scaled.iter().map(|g| g * g).sum();
-        self.functional(prior_variance, self.calibrated.unseen().unwrap_or_default().iter().map(along))
+        let at_all = self.unseen_at_all.iter().map(|pattern| square(pattern)).sum();
+        functional(prior_variance, self.patterns().map(square).sum(), at_all)
     }
 }
 

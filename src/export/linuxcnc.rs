@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::control::{Seen, common, unit};
 use super::curve::Curve;
 use super::lines::Lines;
-use super::numbers::{DEG, MM, fine, fixed, heading};
+use super::numbers::{DEG, MM, fine, fixed, heading, left_open};
 use super::table::POINTS;
 use super::travel::poses;
 use super::{ExportOptions, Exported, Number, refused};
@@ -274,12 +274,8 @@ pub(super) fn write(calibrated: &CalibratedMachine, options: &ExportOptions) -> 
         let tool = if pin.with_tool { options.tool_length } else { 0.0 };
         let (value, was) = ((pins[i] + tool) * MM.per_si, (declared[i] + tool) * MM.per_si);
         let name = format!("{}.{}", module.name, pin.name);
-        let because = (pin.held.is_none() && !verdicts[i].is_determined()).then(|| {
-            format!(
-                "the recordings leave it open: it may be off by {} mm (one standard deviation)",
-                fixed(verdicts[i].open * MM.per_si)
-            )
-        });
+        let is_open = pin.held.is_none() && !verdicts[i].is_determined();
+        let because = is_open.then(|| left_open(verdicts[i].open * MM.per_si, MM.symbol));
         let note = if pin.with_tool { ", the tool's length included" } else { "" };
         let _ = match &because {
             None if pin.is_zero => writeln!(

@@ -39,6 +39,15 @@ pub(super) fn fine(value: f64) -> String {
     if text.trim_start_matches(['-', '0']).is_empty() { "0".into() } else { text.to_string() }
 }
 
+/// Why a number is not entered that may be off by so much of its unit, one standard deviation.
+pub(super) fn left_open(by: f64, unit: &str) -> String {
+    // A component of a direction is off by an angle.
+    let (by, unit) = if unit == "1" { (by * URAD.per_si, URAD.symbol) } else { (by, unit) };
+    // Of a standard deviation two digits say enough.
+    let decimals = (1.0 - by.log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("the recordings leave it open: it may be off by {by:.decimals$} {unit} (one standard deviation)")
+}
+
 /// As short as it reads back.
 pub(super) fn exact(x: f64) -> String {
     let text = format!("{:?}", if x == 0.0 { 0.0 } else { x });

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::control::{Seen, common, square, upright};
 use super::lines::Lines;
-use super::numbers::{MM, fixed, heading};
+use super::numbers::{MM, fixed, heading, left_open};
 use super::{ExportOptions, Exported, Number, Remainder, refused};
 use crate::calibration::CalibratedMachine;
 use crate::error::Result;
@@ -224,12 +224,7 @@ fn write(control: &Control, calibrated: &CalibratedMachine, options: &ExportOpti
                 "" => format!("{}", number + k),
                 _ => format!("{first}{}[1]", number + k),
             };
-            let because = (!verdict.is_determined()).then(|| {
-                format!(
-                    "the recordings leave it open: it may be off by {} {unit} (one standard deviation)",
-                    fixed(verdict.open)
-                )
-            });
+            let because = (!verdict.is_determined()).then(|| left_open(verdict.open, unit));
             let axis = ["x", "y", "z"][k];
             // Directions take what lengths of a metre show as nanometres.
             let shown = |x: f64| if unit == "1" { format!("{x:.9}") } else { fixed(x) };

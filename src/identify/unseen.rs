@@ -1,7 +1,7 @@
 //! What a calibration leaves open of tip and tool axis: deviations that may be there as well, one pattern for
 //! each direction.
 
-use nalgebra::{DMatrix, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
@@ -10,19 +10,31 @@ use super::unknowns::{Layout, Role};
 use crate::chain::Chain;
 use crate::check::random_command;
 use crate::lie::{Twist, Vec3, Wrench};
-use crate::location::LISTED;
+use crate::location::{LISTED, UNSEEN};
 use crate::machine::Machine;
 
 /// Poses over which the directions that move the tool are gathered.
 const POSES: usize = 24;
 
-/// Patterns of deviations, one twist per dyad in machine order (m, rad), each one standard deviation long,
-/// `docs/compensate.md` (C13): of all directions that move the tool as the workpiece sees it, those that come
-/// from the tolerances by more than [`LISTED`] of their variance.
-pub(super) fn unseen(machine: &Machine, layout: &Layout, information: &Information) -> Vec<Vec<Twist<f64>>> {
+/// One twist per dyad in machine order (m, rad), one standard deviation long.
+type Pattern = Vec<Twist<f64>>;
+
+/// Patterns of deviations that a calibration leaves open, `docs/compensate.md` (C13).
+#[derive(Clone, Debug, Default)]
+pub(super) struct Unseen {
+    /// Of all directions that move the tool as the workpiece sees it, those that come from the tolerances by more than [`LISTED`] of
+    /// their variance.
+    pub patterns: Vec<Pattern>,
+    /// What the data do not see at all, where it is not just those of `patterns` that are one tolerance long: a known set-up's frame that
+    /// takes part in it is no part of a pattern, which is shorter then.
+    pub at_all: Option<Vec<Pattern>>,
+}
+
+/// What the data leave open.
+pub(super) fn unseen(machine: &Machine, layout: &Layout, information: &Information) -> Unseen {
     let count = information.positions.len();
     if count == 0 {
-        return Vec::new();
+        return Unseen::default();
     }
     // Where each component of each dyad stands among the unknowns with a prior; `w` as in the first set-up
     // that has one.
@@ -65,27 +77,35 @@ pub(super) fn unseen(machine: &Machine, layout: &Layout, information: &Informati
     let moving: Vec<usize> = (0..count).filter(|i| eigen.eigenvalues[*i] > 1e-12 * largest).collect();
     let basis = DMatrix::from_fn(count, moving.len(), |a, i| eigen.eigenvectors[(a, moving[i])]);
     if moving.is_empty() {
-        return Vec::new();
+        return Unseen::default();
     }
 
-    // Their posterior covariance, in units of the tolerances squared.
+    // A covariance of theirs in units of the tolerances squared, as patterns with their variances.
     let along = information.directions.transpose() * &basis;
-    let weights = information.strength.map(|s| 1.0 / (1.0 + s));
-    let posterior = along.transpose() * DMatrix::from_diagonal(&weights) * along;
-    let eigen = SymmetricEigen::new(posterior);
-    let mut order: Vec<usize> = (0..moving.len()).filter(|i| eigen.eigenvalues[*i] > LISTED).collect();
-    order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    let pattern = |i: usize| {
-        let scaled = &basis * eigen.eigenvectors.column(i) * eigen.eigenvalues[i].sqrt();
-        (0..dyads)
-            .map(|j| {
-                Twist::from_array(std::array::from_fn(|k| {
-                    let value = places[6 * j + k].map_or(0.0, |place| scaled[place]);
-                    // What is a millionth of its tolerance is rounding.
-                    if value.abs() < 1e-6 { 0.0 } else { value * scale(6 * j + k) }
-                }))
-            })
-            .collect()
+    let listed = |weights: DVector<f64>, least: f64| -> Vec<(f64, Pattern)> {
+        let covariance = along.transpose() * DMatrix::from_diagonal(&weights) * &along;
+        let eigen = SymmetricEigen::new(covariance);
+        let mut order: Vec<usize> = (0..moving.len()).filter(|i| eigen.eigenvalues[*i] > least).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let pattern = |i: usize| {
+            let scaled = &basis * eigen.eigenvectors.column(i) * eigen.eigenvalues[i].sqrt();
+            (0..dyads)
+                .map(|j| {
+                    Twist::from_array(std::array::from_fn(|k| {
+                        let value = places[6 * j + k].map_or(0.0, |place| scaled[place]);
+                        // What is a millionth of its tolerance is rounding.
+                        if value.abs() < 1e-6 { 0.0 } else { value * scale(6 * j + k) }
+                    }))
+                })
+                .collect()
+        };
+        order.into_iter().map(|i| (eigen.eigenvalues[i], pattern(i))).collect()
     };
-    order.into_iter().map(pattern).collect()
+    let all = listed(information.strength.map(|s| 1.0 / (1.0 + s)), LISTED);
+    // What moves the tool is told on the machine as declared, and what is seen on the machine as found: directions that move nothing
+    // come out here with the square of their difference, which is less than makes a number one that is not identified.
+    let at_all = listed(information.strength.map(|s| if s == 0.0 { 1.0 } else { 0.0 }), UNSEEN);
+    let is_told = at_all.iter().all(|(variance, _)| *variance >= 1.0 - UNSEEN);
+    let patterns = |listed: Vec<(f64, Pattern)>| listed.into_iter().map(|(_, pattern)| pattern).collect();
+    Unseen { patterns: patterns(all), at_all: (!is_told).then(|| patterns(at_all)) }
 }

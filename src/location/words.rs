@@ -1,6 +1,6 @@
 //! Location errors as people say them: `X and Y are 80 um/m out of square`.
 
-use super::{LocationError, LocationErrors};
+use super::{IDENTIFIED, LocationError, LocationErrors};
 
 /// A value less than this many standard errors from zero is none that anybody should act on.
 const CLEAR: f64 = 2.0;
@@ -24,6 +24,14 @@ const LEANS: &str =
 const PLACE: &str = "enter the place of the axis in the control: `kincal export CALIBRATED.ron --to FORMAT`";
 
 impl LocationErrors {
+    /// Why errors are not identified that come from the data for the most part, if there are any: a sentence without its full stop.
+    pub fn caution(&self) -> Option<&'static str> {
+        let any = self.errors.iter().any(|error| !error.identified && error.share >= IDENTIFIED);
+        any.then_some(
+            "not identified with 90 % and more: the rest lies where these recordings see nothing at all; a test of another kind shows it",
+        )
+    }
+
     /// What is identified and clearly not zero, in the order of the errors; errors with extended names stay in the table alone.
     pub fn in_words(&self) -> Vec<Said> {
         let clear = |error: &&LocationError| {

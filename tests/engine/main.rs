@@ -17,6 +17,7 @@ mod curves;
 mod directions;
 mod drives;
 mod effects_compensated;
+mod entered;
 mod error_motions;
 mod instrument_noise;
 mod location;

@@ -271,6 +271,7 @@ pub(super) fn geometry(found: &LocationErrors) -> Markup {
             }
             (table_of("rad"))
             (table_of("m"))
+            @if let Some(caution) = found.caution() { p.note { "Errors " (caution) "." } }
         }
     }
 }
