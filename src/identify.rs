@@ -167,7 +167,7 @@ fn identify(
     let mut problem = Problem::new(machine, &sources, &layout, varying, is_of_setup);
     problem.progress = progress;
     progress("finding the set-ups");
-    let Placed { solution: placed, noise, thin } = place(&mut problem, start)?;
+    let Placed { solution: placed, noise, thin, loss } = place(&mut problem, start)?;
     let nominal = placed.normal.tallies.clone();
     let declared = placed.unknowns.clone();
 
@@ -178,7 +178,9 @@ fn identify(
         let play = |j| varying.directions.as_ref().and_then(|directions| directions.play(machine, j));
         problem.motions = Motions::new(machine, &sources.ranges(), model.error_motions, play);
     }
-    let mut found = settle_from_afar(&mut problem, options.solver, placed.unknowns, noise)?;
+    let Solution { unknowns, normal, .. } = placed;
+    let at_start = (loss == options.loss && problem.motions.len() == 0).then_some(normal);
+    let mut found = settle_from_afar(&mut problem, options.solver, unknowns, noise, at_start)?;
     let room = problem.motions.clone();
     let fitting = |but_play: f64| Layout::new(machine, &sources, varying, but_play);
     // Without room for error motions, those would speak for direction parts.
@@ -202,7 +204,7 @@ fn identify(
         }
         let mut start = found.solution.unknowns;
         start.motions.clear();
-        found = settle(&problem, options.solver, start, found.noise)?;
+        found = settle(&problem, options.solver, start, found.noise, None)?;
     }
     let layout = problem.layout;
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
@@ -274,7 +276,8 @@ fn attempt_setup(
     });
     problem.loss = loss;
     let Placed { solution: placed, noise, .. } = place(&mut problem, start)?;
-    let found = settle(&problem, Solver::LevenbergMarquardt, placed.unknowns, noise)?;
+    let at_start = Some(placed.normal);
+    let found = settle(&problem, Solver::LevenbergMarquardt, placed.unknowns, noise, at_start)?;
     let mut fitted = calibrated.clone();
     let unknowns = &found.solution.unknowns;
     put_setups(&mut fitted, &sources, unknowns);
@@ -386,7 +389,9 @@ pub fn reach(machine: &Machine, recordings: &[Recording]) -> Result<Reach> {
 /// Set-ups as found before anything of the machine is identified.
 struct Placed {
     solution: Solution,
+    /// With which the solution was weighted.
     noise: Vec<Noise>,
+    loss: Loss,
     thin: Vec<Thin>,
 }
 
@@ -404,7 +409,7 @@ fn place(problem: &mut Problem, mut start: Unknowns) -> Result<Placed> {
         noise = thin::robust_noise(machine, sources, &thin, &solution.unknowns);
         solution = problem.solve(Solver::LevenbergMarquardt, solution.unknowns, &noise)?;
     }
-    Ok(Placed { solution, noise, thin })
+    Ok(Placed { solution, noise, loss: problem.loss, thin })
 }
 
 /// Refuses what cannot be identified at all.

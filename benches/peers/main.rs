@@ -71,14 +71,16 @@ fn distance_rows(folder: &Folder, machine: &Machine, results: &Results) {
     let seconds = time(21, || batch.distance_rows_into(&q, origin, origin, &mut rows));
     let check = largest_difference(&folder.rows_of_left_increments("poses_general", &rows), &reference);
     results.tell("W2", "batch", &seconds, units, check, "rows of increments behind exp(dh); turned untimed");
-    let few = q.rows(0, 96).into_owned();
-    let mut rows = DMatrix::zeros(96, 43);
-    let seconds = time(21, || {
-        for _ in 0..units / 96 {
-            batch.distance_rows_into(&few, origin, origin, &mut rows);
-        }
-    });
-    results.tell("W2", "batch; L1-resident output", &seconds, units / 96 * 96, f64::NAN, "");
+    for (height, name) in [(96, "batch; L1-resident output"), (20_000, "batch; L3-resident output")] {
+        let few = q.rows(0, height).into_owned();
+        let mut rows = DMatrix::zeros(height, 43);
+        let seconds = time(21, || {
+            for _ in 0..units / height {
+                batch.distance_rows_into(&few, origin, origin, &mut rows);
+            }
+        });
+        results.tell("W2", name, &seconds, units / height * height, f64::NAN, "");
+    }
     let mut all = vec![0.0; 43 * units];
     let seconds = time(21, || {
         for (q, numbers) in joints.chunks_exact(5).zip(all.chunks_exact_mut(43)) {

@@ -68,6 +68,16 @@ impl Normal {
             whole: None,
         }
     }
+
+    /// With every weight times `factor`, and no room for error motions.
+    pub fn times(&self, factor: f64) -> Normal {
+        Normal {
+            matrix: &self.matrix * factor,
+            gradient: &self.gradient * factor,
+            loss: self.loss * factor,
+            ..self.clone()
+        }
+    }
 }
 
 /// Squared standardised residual per reading of a sample.

@@ -41,12 +41,13 @@ pub(crate) fn optimum<'a>(
     let mut problem = Problem::new(machine, &sources, &layout, &CONSTANT, is_of_setup);
     problem.progress = progress;
     let start = Unknowns::nominal(machine, &sources, &CONSTANT);
-    let Placed { solution: placed, noise, thin } = place(&mut problem, start)?;
+    let Placed { solution: placed, noise, loss, thin } = place(&mut problem, start)?;
     let (nominal, declared) = (placed.normal.tallies.clone(), placed.unknowns.clone());
     problem.loss = options.loss;
     problem.prior = options.prior;
     problem.free = vec![true; layout.len];
-    let found = settle_from_afar(&mut problem, options.solver, placed.unknowns, noise)?;
+    let at_start = (loss == options.loss).then_some(placed.normal);
+    let found = settle_from_afar(&mut problem, options.solver, placed.unknowns, noise, at_start)?;
     let open = problem.open(&found.solution.unknowns, &found.noise, &thin, information::OPEN);
     let information = Info::new(&found.solution.normal.matrix, &layout, problem.prior, open);
     let fit = fit::report(&problem, &nominal, &declared, &found, information, options)?;

@@ -1,6 +1,7 @@
 //! The noise and the solution that belong together: solved in rounds, from where the set-ups were found, and from afar.
 
 use super::Info;
+use super::loss::Loss;
 use super::noise::{Noise, with_stated};
 use super::normal::{self, Normal};
 use super::plausible;
@@ -10,7 +11,7 @@ use super::tally::{Sums, Tally};
 use super::thin;
 use super::unknowns::Unknowns;
 use crate::error::Result;
-use crate::units::Rms;
+use crate::units::{Quantity, Rms};
 
 /// Rounds of re-estimating the noise from the residuals.
 const NOISE_ROUNDS: usize = 12;
@@ -38,10 +39,19 @@ impl Found {
     }
 }
 
-/// Solves, takes the noise from what is left, and solves again until the noise no longer changes.
-pub(super) fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: Vec<Noise>) -> Result<Found> {
+/// Solves, takes the noise from what is left, and solves again until the noise no longer changes. Where other noise gives the same sums but
+/// for a factor, they are not taken anew; a scheme that lets the prior and all scales alone would walk the same way again, and does not.
+///
+/// `at_start` are the sums at the start with this noise, where they are at hand.
+pub(super) fn settle(
+    problem: &Problem,
+    solver: Solver,
+    start: Unknowns,
+    noise: Vec<Noise>,
+    at_start: Option<Normal>,
+) -> Result<Found> {
     let mut noise = noise;
-    let mut solution = problem.solve(solver, start.clone(), &noise)?;
+    let mut solution = problem.solve_on(solver, start.clone(), at_start, &noise)?;
     let mut steps = solution.steps;
     let mut seen = noise.clone();
     for _ in 0..NOISE_ROUNDS {
@@ -54,14 +64,33 @@ pub(super) fn settle(problem: &Problem, solver: Solver, start: Unknowns, noise: 
         if !changed {
             break;
         }
+        let weighed = reweighed(problem, &solution.normal, &noise, &next);
         noise = next;
-        // The named rivals regularise by their number of steps, so they always start afresh.
-        let from = if solver.uses_prior() { solution.unknowns.clone() } else { start.clone() };
-        solution = problem.solve(solver, from, &noise)?;
+        solution = match weighed {
+            Some(normal) if !solver.uses_prior() && !problem.prior => Solution { normal, ..solution },
+            // The named rivals regularise by their number of steps, so they always start afresh.
+            _ if !solver.uses_prior() => problem.solve(solver, start.clone(), &noise)?,
+            weighed => problem.solve_on(solver, solution.unknowns, weighed, &noise)?,
+        };
         steps = if solver.uses_prior() { steps + solution.steps } else { solution.steps };
     }
     solution.steps = steps;
     Ok(Found { solution, noise, seen })
+}
+
+/// The sums at other noise, where they follow from those at hand: of least squares, by one factor for all readings.
+fn reweighed(problem: &Problem, normal: &Normal, from: &[Noise], to: &[Noise]) -> Option<Normal> {
+    if problem.loss != Loss::Squares || problem.motions.len() > 0 {
+        return None;
+    }
+    let of_source = |((tally, from), to): ((&Tally, &Noise), &Noise)| {
+        let of = |quantity| (tally.residuals[quantity].rows > 0).then(|| from[quantity] / to[quantity]);
+        [of(Quantity::Length), of(Quantity::Angle)]
+    };
+    let mut ratios = normal.tallies.iter().zip(from).zip(to).flat_map(of_source).flatten();
+    let ratio = ratios.next()?;
+    let is_one = ratios.all(|other| (other - ratio).abs() <= f64::EPSILON * ratio);
+    is_one.then(|| normal.times(ratio * ratio))
 }
 
 /// As [`settle`], but not held back by the prior. Far from the optimum the residuals are large; taken for noise, they let the tolerances
@@ -72,8 +101,9 @@ pub(super) fn settle_from_afar(
     solver: Solver,
     start: Unknowns,
     noise: Vec<Noise>,
+    at_start: Option<Normal>,
 ) -> Result<Found> {
-    let found = settle(problem, solver, start, noise)?;
+    let found = settle(problem, solver, start, noise, at_start)?;
     let enough = problem.sources.readings() >= READINGS_EACH * problem.layout.len as u64;
     let constant = problem.varying.is_constant() && problem.motions.len() == 0;
     if !(problem.prior && constant && enough) {
@@ -84,7 +114,9 @@ pub(super) fn settle_from_afar(
         return Ok(found);
     }
     problem.prior = false;
-    let without = settle(problem, solver, found.solution.unknowns.clone(), found.noise.clone());
+    // The prior is no part of the sums.
+    let Solution { unknowns, normal, .. } = &found.solution;
+    let without = settle(problem, solver, unknowns.clone(), found.noise.clone(), Some(normal.clone()));
     problem.prior = true;
     let without = without?;
     let held_back = |with: &Found, without: &Found| {
@@ -96,7 +128,8 @@ pub(super) fn settle_from_afar(
     if !held_back(&found, &without) {
         return Ok(found);
     }
-    let again = settle(problem, solver, without.solution.unknowns, without.noise)?;
+    let Solution { unknowns, normal, .. } = without.solution;
+    let again = settle(problem, solver, unknowns, without.noise, Some(normal))?;
     let is_deviation = problem.farthest(&again.solution.unknowns) <= OTHER_MACHINE;
     let explains = || plausible::explains(problem, &found.solution.unknowns, &again.solution.unknowns);
     Ok(if held_back(&found, &again) && is_deviation && explains()? { again } else { found })

@@ -221,16 +221,30 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// If a recording cannot be read again, or [`Solver::GaussNewton`] meets a singular matrix.
     pub fn solve(&self, solver: Solver, start: Unknowns, noise: &[Noise]) -> Result<Solution> {
+        self.solve_on(solver, start, None, noise)
+    }
+
+    /// As [`Problem::solve`]; `at_start` are the sums at the start with this noise, where they are at hand.
+    pub fn solve_on(
+        &self,
+        solver: Solver,
+        start: Unknowns,
+        at_start: Option<Normal>,
+        noise: &[Noise],
+    ) -> Result<Solution> {
+        let normal = match at_start {
+            Some(normal) => normal,
+            None => self.normal(&start, noise)?,
+        };
         match solver {
-            Solver::LevenbergMarquardt => self.levenberg_marquardt(start, noise),
-            _ => self.without_control(solver, start, noise),
+            Solver::LevenbergMarquardt => self.levenberg_marquardt(start, normal, noise),
+            _ => self.without_control(solver, start, normal, noise),
         }
     }
 
-    fn levenberg_marquardt(&self, start: Unknowns, noise: &[Noise]) -> Result<Solution> {
+    fn levenberg_marquardt(&self, start: Unknowns, mut normal: Normal, noise: &[Noise]) -> Result<Solution> {
         let scales = self.layout.scales();
         let mut unknowns = start;
-        let mut normal = self.normal(&unknowns, noise)?;
         unknowns.motions.clone_from(&normal.motions);
         let mut objective = normal.loss + self.penalty(&unknowns);
         let (mut damping, mut growth) = (None, 2.0);
@@ -287,7 +301,13 @@ impl<'a> Problem<'a> {
     }
 
     /// The schemes that take every step as it comes.
-    fn without_control(&self, solver: Solver, start: Unknowns, noise: &[Noise]) -> Result<Solution> {
+    fn without_control(
+        &self,
+        solver: Solver,
+        start: Unknowns,
+        mut normal: Normal,
+        noise: &[Noise],
+    ) -> Result<Solution> {
         let plain = DVector::from_element(self.layout.len, 1.0);
         let scales = match solver {
             Solver::RankTruncation { .. } => self.layout.scales(),
@@ -298,7 +318,6 @@ impl<'a> Problem<'a> {
             _ => 50,
         };
         let mut unknowns = start;
-        let mut normal = self.normal(&unknowns, noise)?;
         unknowns.motions.clone_from(&normal.motions);
         for steps in 0..most {
             (self.progress)(&format!("step {}", steps + 1));

@@ -213,6 +213,32 @@ fn the_named_solvers_do_what_their_names_say() {
 }
 
 #[test]
+fn least_squares_is_weighed_with_the_noise_that_is_told() {
+    let machine = common::machine("ac_table_tilting");
+    let truth =
+        CalibratedMachine::nominal(machine.clone()).with_deviations(random_deviations(&machine, 1.0, 3));
+    let (instrument, header) = instrument(&machine, Sensor::Distance { absolute: false });
+    for stated in [None, Some("sigma[um]: 20"), Some("sigma[um]: 0.01")] {
+        let header: Vec<String> = header.iter().cloned().chain(stated.map(String::from)).collect();
+        let csv = recording(&truth, &instrument, &random_commands(&machine, 600, 4), &header, 5);
+        let recordings =
+            [Recording::from_bytes("d.csv", csv.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))];
+        let fixed = Solver::FixedDamping { tau: 1e-8, steps: 5 };
+        for solver in [Solver::default(), fixed, Solver::RankTruncation { cut: 1e-6 }] {
+            let options = CalibrateOptions::default().with_solver(solver).with_loss(Loss::Squares);
+            let (_, fit) = calibrate(&machine, &recordings, options).unwrap_or_else(|e| panic!("{e}"));
+            let (rms, sigma) = (fit.rms.m.expect("lengths").geometric, fit.recordings[0].sigma);
+            let told = 0.5 * fit.samples as f64 * (rms / sigma).powi(2);
+            assert!(
+                (fit.loss_value / told - 1.0).abs() < 1e-12,
+                "{stated:?} {solver:?}: {} {told}",
+                fit.loss_value
+            );
+        }
+    }
+}
+
+#[test]
 fn noise_of_clean_data_is_found_the_same_under_every_loss() {
     let machine = tightened(&common::machine("six_r_arm"));
     let truth =
