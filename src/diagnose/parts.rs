@@ -9,7 +9,6 @@ use super::coarse::Coarse;
 use super::diagnosis::Named;
 use super::folds;
 use super::held_out::Model;
-use super::marginal::Marginal;
 use super::nameless::UnnamedPart;
 use super::noise::Noise;
 use super::rms::rms_of;
@@ -39,16 +38,6 @@ fn standard_errors(search: &Search, all: &[ModelTerm], i: usize) -> f64 {
     let by = |(gain, error): (f64, f64)| gain / error.max(f64::MIN_POSITIVE);
     let own = folds::gain(search, all, i).map_or(f64::NEG_INFINITY, by);
     folds::gain_elsewhere(search, all, i).map_or(own, by).min(own)
-}
-
-/// Whether a hypothesis is likelier than nothing where chance is as large as what it leaves: what it takes away itself is none.
-fn stands_out(search: &Search, hypothesis: &Hypothesis, beside: &Marginal) -> bool {
-    let held = |weight: f64| weight > ENTER;
-    held(hypothesis.weight) || {
-        let left = search.leftover(beside).overdispersion.min(search.overdispersion);
-        let prior = search.priors[hypothesis.candidate];
-        held(prior + (hypothesis.weight - prior) * search.overdispersion / left)
-    }
 }
 
 /// Of the terms that are not foretold so, the one that is so least.
@@ -125,6 +114,22 @@ impl Unnamed {
         in_model: &[ModelTerm],
         is_asked: impl Fn(&usize) -> bool,
     ) -> (Vec<ModelTerm>, Option<ModelTerm>) {
+        let found = self.parts_beside(search, in_model, &is_asked);
+        if search.overdispersion <= 1.0 || !found.0.is_empty() {
+            return found;
+        }
+        // Nothing stands out from what is there: then it is no chance.
+        let search = Search { overdispersion: 1.0, ..self.search(search, search.rows) };
+        self.parts_beside(&search, in_model, &is_asked)
+    }
+
+    /// The same, where chance is as large as the search has it.
+    fn parts_beside(
+        &self,
+        search: &Search,
+        in_model: &[ModelTerm],
+        is_asked: impl Fn(&usize) -> bool,
+    ) -> (Vec<ModelTerm>, Option<ModelTerm>) {
         let (mut all, first) = (in_model.to_vec(), in_model.len());
         let mut told = None;
         let is_reading = |c: &usize| self.candidates[*c].place == Place::Measurement;
@@ -140,11 +145,8 @@ impl Unnamed {
                 !search.goes_by_clock(h.candidate) || h.score.gain > search.discrepancy_error(h, &all)
             };
             let (mut next, mut tries) = (None, 0);
-            for hypothesis in hypotheses.iter().take_while(|h| h.weight > 0.0).filter(is_own) {
+            for hypothesis in hypotheses.iter().filter(|h| h.weight > ENTER).filter(is_own) {
                 let Some(term) = search.enter_bare(hypothesis, &marginal) else { continue };
-                if !stands_out(search, hypothesis, &marginal.with(&term.columns)) {
-                    continue;
-                }
                 let with = [all.as_slice(), std::slice::from_ref(&term)].concat();
                 if is_foretold(search, &with, all.len()) {
                     next = Some(term);

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use crate::harness;
 use kincal::Machine;
+use kincal::diagnose::{DiagnoseOptions, diagnose};
+use kincal::effects::Library;
 use kincal::identify::{CalibrateOptions, Loss, calibrate};
 use kincal::recording::Recording;
 
@@ -334,4 +336,32 @@ fn one_effect_that_is_nearly_two_does_not_hide_them() {
     let answers = vec![case.write(&folder).expect("written")];
     let score = judged(&folder, &harness::machine_folder(), &answers);
     assert_eq!((score.two_right, score.f1()), (2, 1.0), "{:?}", score.failures);
+}
+
+/// A case of seed 95311, on a machine that is shipped: a scale error of Y, on paths where a carriage that turns over does nearly the same.
+const TURNED_OVER: (u64, usize) = (95311, 48);
+
+#[test]
+#[ignore = "long: the engine on a blind case of three recordings"]
+fn no_name_turns_a_carriage_over() {
+    let folder = folder("turned_over");
+    let (seed, of) = TURNED_OVER;
+    let case = draw(&harness::machines(), Kind::Standard, Some(Mode::One), seed, of);
+    case.write(&folder).expect("written");
+    let machine = harness::machine_folder().join(format!("{}.ron", case.world.body.name));
+    let machine = Machine::open(&machine).expect("shipped");
+    let open = |k: usize| Recording::open(folder.join(case.label()).join(format!("rec_{k}.csv")), &machine);
+    let recordings: Vec<Recording> =
+        (1..case.world.runs.len()).map(|k| open(k).expect("a recording")).collect();
+    // All left out that makes Y longer.
+    let without = ["scale_error", "positioning_error", "local_defect", "non_rigid_coupling", "thermal_drift"];
+    let left_out =
+        |library: Library, family: &&str| library.without(family).unwrap_or_else(|e| panic!("{e}"));
+    let library = without.iter().fold(Library::standard(), left_out);
+    let said = diagnose(&machine, &recordings, &library, &DiagnoseOptions::default(), &|_| {});
+    let said = said.unwrap_or_else(|e| panic!("{e}"));
+    assert!(said.findings.is_empty(), "{:?}", said.findings);
+    let parts = said.unexplained.iter().flat_map(|unexplained| &unexplained.parts);
+    let at: Vec<&str> = parts.filter(|part| part.modelled).map(|part| part.at.as_str()).collect();
+    assert_eq!(at, ["y"]);
 }
