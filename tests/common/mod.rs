@@ -10,6 +10,7 @@ pub mod random;
 
 use std::path::{Path, PathBuf};
 
+use kincal::effects::Library;
 use kincal::inverse::{Goal, Inverse, InverseOptions, Mode, Outcome};
 use kincal::lie::{Mat3, Pose, Vec3};
 use kincal::{Chain, Machine};
@@ -33,6 +34,12 @@ pub fn machines() -> Vec<(String, Machine)> {
 /// One shipped machine.
 pub fn machine(stem: &str) -> Machine {
     machines().into_iter().find(|(name, _)| name == stem).unwrap_or_else(|| panic!("{stem} is shipped")).1
+}
+
+/// The library without these families, their forms and kinds.
+pub fn library_without(families: &[&str]) -> Library {
+    let without = |library: Library, family: &&str| library.without(family).unwrap_or_else(|e| panic!("{e}"));
+    families.iter().fold(Library::standard(), without)
 }
 
 /// Columns of `f64` have sines and exponentials of their own, to a few units in the last place of one; dual numbers those of the standard library.

@@ -4,10 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::common;
 use crate::harness;
 use kincal::Machine;
 use kincal::diagnose::{DiagnoseOptions, diagnose};
-use kincal::effects::Library;
 use kincal::identify::{CalibrateOptions, Loss, calibrate};
 use kincal::recording::Recording;
 
@@ -355,9 +355,7 @@ fn no_name_turns_a_carriage_over() {
         (1..case.world.runs.len()).map(|k| open(k).expect("a recording")).collect();
     // All left out that makes Y longer.
     let without = ["scale_error", "positioning_error", "local_defect", "non_rigid_coupling", "thermal_drift"];
-    let left_out =
-        |library: Library, family: &&str| library.without(family).unwrap_or_else(|e| panic!("{e}"));
-    let library = without.iter().fold(Library::standard(), left_out);
+    let library = common::library_without(&without);
     let said = diagnose(&machine, &recordings, &library, &DiagnoseOptions::default(), &|_| {});
     let said = said.unwrap_or_else(|e| panic!("{e}"));
     assert!(said.findings.is_empty(), "{:?}", said.findings);

@@ -56,15 +56,6 @@ fn path(machine: &Machine, name: &str, wrong: &Wrong, [a, b, c]: [f64; 3]) -> Re
     Recording::from_bytes(name, text.into_bytes(), machine).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn without(family: &str) -> Library {
-    without_all(&[family])
-}
-
-fn without_all(families: &[&str]) -> Library {
-    let without = |library: Library, family: &&str| library.without(family).unwrap_or_else(|e| panic!("{e}"));
-    families.iter().fold(Library::standard(), without)
-}
-
 /// The file of effects that is proposed, and its law; at this place.
 fn proposed(
     machine: &Machine,
@@ -85,7 +76,7 @@ fn proposed(
 
 /// The law that is found at a joint where this family is not known, once the file with it has been found again on another path.
 fn law_found_again(family: &str, wrong: &Wrong, at: &str) -> Vec<String> {
-    let (machine, library) = (common::machine("xyz_mill"), without(family));
+    let (machine, library) = (common::machine("xyz_mill"), common::library_without(&[family]));
     let seen =
         [path(&machine, "seen.csv", wrong, SEEN), path(&machine, "again.csv", wrong, [0.26, 0.27, 0.15])];
     let (ron, law) = proposed(&machine, &seen, &library, at).expect("a law");
@@ -113,7 +104,7 @@ fn what_goes_by_the_clock_gets_a_law_too() {
     let machine = common::machine("xyz_mill");
     let law = |wrong: &Wrong, families: &[&str], at: &str| {
         let seen = [path(&machine, "seen.csv", wrong, SEEN)];
-        proposed(&machine, &seen, &without_all(families), at).expect("a law").1
+        proposed(&machine, &seen, &common::library_without(families), at).expect("a law").1
     };
     let drifts = ["thermal_drift", "sensor_drift", "setup_slip"];
     assert_eq!(law(&WARMS_UP, &drifts, "x"), ["1 - exp(-t/time_constant)"]);
@@ -128,7 +119,7 @@ fn what_names_leave_is_modelled_beside_them() {
     let both = Wrong { x: YIELDS.x, ..DENTED };
     let seen = [path(&machine, "seen.csv", &both, SEEN)];
     // As it is seen on one path, a guideway may climb there.
-    let library = without("local_defect").without("positioning_error").unwrap_or_else(|e| panic!("{e}"));
+    let library = common::library_without(&["local_defect", "positioning_error"]);
     let said = diagnose(&machine, &seen, &library, &DiagnoseOptions::default(), &|_| {});
     let said = said.unwrap_or_else(|e| panic!("{e}"));
     let found: Vec<_> = said.findings.iter().map(|f| (f.effect.as_str(), f.at.as_str())).collect();
