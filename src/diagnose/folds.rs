@@ -116,6 +116,15 @@ pub(super) fn are_better(search: &Search, these: &[ModelTerm], others: &[ModelTe
     fall > error
 }
 
+/// Whether stretches that were left out are foretold by these effects as well as by others: no worse by more than one standard error of what the
+/// others leave there.
+pub(super) fn are_as_good(search: &Search, these: &[ModelTerm], others: &[ModelTerm]) -> bool {
+    let Some(folds) = Folds::new(search, &[these, others].concat()) else { return false };
+    let of_others = folds.left_out(search, &|effect| effect >= these.len());
+    let (fall, _) = folds.fall(search, &of_others, &folds.left_out(search, &|effect| effect < these.len()));
+    -fall <= folds.error(search, &of_others)
+}
+
 /// Which part of the squares of left-out stretches is left with all effects, against what the first of them leave, the noise's own taken from
 /// both; of lengths or of angles, whichever fall by the larger part: what shifts a frame turns nothing. `None` where there are too few rows, or
 /// nothing but noise.
@@ -415,15 +424,32 @@ impl Folds {
         (without, with): (&[f64], &[f64]),
         counts: &dyn Fn(usize) -> bool,
     ) -> (f64, f64) {
+        let means = self.means(search, without, counts);
+        self.sum(search, counts, &|row, angle| {
+            (without[row].powi(2) - with[row].powi(2)) / if angle { means.rad } else { means.m }
+        })
+    }
+
+    /// The standard error of the sum of squares of what is left, in units of their mean.
+    fn error(&self, search: &Search, left: &[f64]) -> f64 {
+        let means = self.means(search, left, &|_| true);
+        let one = |row: usize, angle| left[row].powi(2) / if angle { means.rad } else { means.m } - 1.0;
+        self.sum(search, &|_| true, &one).1
+    }
+
+    /// The sum over the rows that count, each by its number and whether it is an angle, and its standard error from how much stretches differ.
+    fn sum(
+        &self,
+        search: &Search,
+        counts: &dyn Fn(usize) -> bool,
+        of_row: &dyn Fn(usize, bool) -> f64,
+    ) -> (f64, f64) {
         let linear = search.rows.linear;
         let used = |row: &usize| !search.rows.whitener.out[*row] && counts(*row);
-        let means = self.means(search, without, counts);
-        let mean = |row: usize| if linear.angle[row] { means.rad } else { means.m };
         let mut cells: BTreeMap<(usize, usize), f64> = BTreeMap::new();
         for (number, span) in linear.spans.iter().enumerate() {
             for row in (span.rows.0..span.rows.1).filter(used) {
-                let fall = (without[row].powi(2) - with[row].powi(2)) / mean(row);
-                *cells.entry((number, self.stretch[row])).or_default() += fall;
+                *cells.entry((number, self.stretch[row])).or_default() += of_row(row, linear.angle[row]);
             }
         }
         let (count, sum) = (cells.len() as f64, cells.values().sum::<f64>());

@@ -21,6 +21,7 @@ use crate::effects::{Candidate, Library, Place, RecordingFacts};
 use crate::feature::Dependence;
 use crate::machine::Machine;
 use crate::units::{ByQuantity, Quantity};
+use crate::variation::Slot;
 
 /// More parts are not looked for.
 const MOST: usize = 16;
@@ -115,12 +116,22 @@ impl Unnamed {
         is_asked: impl Fn(&usize) -> bool,
     ) -> (Vec<ModelTerm>, Option<ModelTerm>) {
         let found = self.parts_beside(search, in_model, &is_asked);
-        if search.overdispersion <= 1.0 || !found.0.is_empty() {
+        if search.overdispersion <= 1.0 {
             return found;
         }
-        // Nothing stands out from what is there: then it is no chance.
-        let search = Search { overdispersion: 1.0, ..self.search(search, search.rows) };
-        self.parts_beside(&search, in_model, &is_asked)
+        // What stands out is known to be no chance, and where nothing does, what is there is none.
+        let all = [in_model, &found.0].concat();
+        let overdispersion = match found.0.is_empty() {
+            true => 1.0,
+            false => search.leftover(&search.beside_names(&all)).overdispersion.max(1.0),
+        };
+        if overdispersion >= search.overdispersion {
+            return found;
+        }
+        let search = Search { overdispersion, ..self.search(search, search.rows) };
+        let again = self.parts_beside(&search, in_model, &is_asked);
+        let with = [in_model, &again.0].concat();
+        if again.0.is_empty() || folds::are_better(&search, &all, &with) { found } else { again }
     }
 
     /// The same, where chance is as large as the search has it.
@@ -132,7 +143,10 @@ impl Unnamed {
     ) -> (Vec<ModelTerm>, Option<ModelTerm>) {
         let (mut all, first) = (in_model.to_vec(), in_model.len());
         let mut told = None;
-        let is_reading = |c: &usize| self.candidates[*c].place == Place::Measurement;
+        let is_reading = |c: &usize| {
+            let mut parts = self.candidates[*c].coefficients.iter().flat_map(|c| &c.parts);
+            self.candidates[*c].place == Place::Measurement && parts.all(|part| part.slot == Slot::Reading)
+        };
         // What a joint or a frame does is no reading's.
         let (mut rest, mut open): (Vec<usize>, Vec<usize>) =
             (0..self.candidates.len()).filter(is_asked).partition(is_reading);

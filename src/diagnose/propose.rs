@@ -92,7 +92,7 @@ fn held_out(search: &Search, others: &[ModelTerm], terms: &[ModelTerm]) -> ByQua
     ByQuantity::of(|quantity| Some(HeldOutPair { before: before[quantity]?, after: after[quantity]? }))
 }
 
-/// A few terms at a place that foretell stretches left out no worse than the free function, by less than one standard error.
+/// A few terms at a place that foretell stretches left out as well as the free function.
 fn law(
     search: &Search,
     laws: &Unnamed,
@@ -130,7 +130,7 @@ fn law(
         if let Some(i) = (others.len()..all.len()).find(|i| !is_foretold(search, &all, *i)) {
             all.remove(i);
         }
-        if !folds::are_better(search, &free, &all) {
+        if folds::are_as_good(search, &all, &free) {
             return Some(all.split_off(others.len()));
         }
     }

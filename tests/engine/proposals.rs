@@ -15,17 +15,19 @@ const SIGMA: f64 = 0.5e-6;
 const SEEN: [f64; 3] = [0.31, 0.23, 0.17];
 
 /// What an axis has besides its command, m: of x where it stands and how it accelerates; of z where it stands; of the first component of the
-/// reading the time, s.
+/// reading the time, s; by how much the reading is late, s.
 struct Wrong {
     x: fn(f64, f64) -> f64,
     z: fn(f64) -> f64,
     read: fn(f64) -> f64,
+    late: f64,
 }
 
-const NOTHING: Wrong = Wrong { x: |_, _| 0.0, z: |_| 0.0, read: |_| 0.0 };
+const NOTHING: Wrong = Wrong { x: |_, _| 0.0, z: |_| 0.0, read: |_| 0.0, late: 0.0 };
 const YIELDS: Wrong = Wrong { x: |_, acceleration| 1e-3 * acceleration, ..NOTHING };
 const WARMS_UP: Wrong = Wrong { read: |t| 6e-6 * (1.0 - (-t / 60.0).exp()), ..NOTHING };
 const SHAKES: Wrong = Wrong { read: |t| 1.5e-6 * (TAU * 2.3 * t).sin(), ..NOTHING };
+const LATE: Wrong = Wrong { late: 1e-3, ..NOTHING };
 const DENTED: Wrong = Wrong { z: |z| dent(z - 0.03), ..NOTHING };
 
 /// 8 um over some 10 mm to either side.
@@ -42,12 +44,17 @@ fn path(machine: &Machine, name: &str, wrong: &Wrong, [a, b, c]: [f64; 3]) -> Re
     );
     for k in 0..900 {
         let t = 0.1 * f64::from(k);
-        // Of one sine alone the acceleration is a scale error.
-        let swing = |size: f64, rate: f64| (size * (rate * t).sin(), -size * rate * rate * (rate * t).sin());
-        let (slow, fast) = (swing(0.12, a), swing(0.04, 2.7 * a));
-        let q = [slow.0 + fast.0, 0.12 * (b * t).sin(), 0.1 * (c * t).cos()];
+        // Where x, y and z are, and how x accelerates. Of one sine alone the acceleration is a scale error.
+        let at_time = |t: f64| {
+            let swing =
+                |size: f64, rate: f64| (size * (rate * t).sin(), -size * rate * rate * (rate * t).sin());
+            let (slow, fast) = (swing(0.12, a), swing(0.04, 2.7 * a));
+            ([slow.0 + fast.0, 0.12 * (b * t).sin(), 0.1 * (c * t).cos()], slow.1 + fast.1)
+        };
+        let (q, _) = at_time(t);
+        let (read, acceleration) = at_time(t - wrong.late);
         // The machine's order.
-        let at = [q[1], q[0] + (wrong.x)(q[0], slow.1 + fast.1), q[2] + (wrong.z)(q[2])];
+        let at = [read[1], read[0] + (wrong.x)(read[0], acceleration), read[2] + (wrong.z)(read[2])];
         let mut p = chain.w_from_t(&at).transform(Vec3([0.0; 3])).0.map(|x| x + SIGMA * random.normal());
         p[0] += (wrong.read)(t);
         let row: Vec<String> = q.iter().chain(&p).map(|x| format!("{:.6}", 1e3 * x)).collect();
@@ -111,6 +118,15 @@ fn what_goes_by_the_clock_gets_a_law_too() {
     // It is as large as the noise, and goes to and fro from reading to reading as that does.
     let tone = ["sin(2π frequency t)", "cos(2π frequency t)"];
     assert_eq!(law(&SHAKES, &["vibration"], "measurement"), tone);
+}
+
+#[test]
+fn readings_of_another_moment_have_one_law_for_all_joints() {
+    let machine = common::machine("xyz_mill");
+    let seen = [path(&machine, "seen.csv", &LATE, SEEN)];
+    let library = common::library_without(&["latency", "servo_lag", "hysteresis"]);
+    let (_, law) = proposed(&machine, &seen, &library, "measurement").expect("a law");
+    assert_eq!(law, ["v"]);
 }
 
 #[test]

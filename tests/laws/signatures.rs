@@ -45,7 +45,7 @@ fn what_is_stored_is_what_the_library_draws() {
         let stored = std::fs::read_to_string(folder.join(&own.file)).expect("it is listed");
         // Rounding differs from processor to processor: a point may stand one step aside, and both ways to it and from it with it.
         let ((words, numbers), (own_words, own_numbers)) = (taken_apart(&stored), taken_apart(&own.text));
-        assert_eq!(words, own_words, "{}: {again}", own.file);
+        assert!(words == own_words, "{}: {again}", own.file);
         assert_eq!(numbers.len(), own_numbers.len(), "{}: {again}", own.file);
         for (a, b) in numbers.iter().zip(&own_numbers) {
             assert!((a - b).abs() <= 2.0, "{}: {a} {b}: {again}", own.file);
