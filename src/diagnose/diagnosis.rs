@@ -51,6 +51,9 @@ pub struct Diagnosis {
     /// Joints that stand still all through a recording, and have an effect that depends on how they came there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stand_still: Vec<StandsStill>,
+    /// Sides from which joints came before they first moved, where they are others than the recordings show.
+    #[serde(skip)]
+    pub(super) approaches: Vec<Approach>,
     /// What no family explains.
     pub unexplained: Option<Unexplained>,
     /// Families for that, where they were asked for.
@@ -191,9 +194,6 @@ pub struct StandsStill {
     /// What would say so in the recording itself; `None` where the joint follows several commands.
     #[serde(flatten)]
     pub said_by: Option<SaidBy>,
-    /// Where that is, by recording and dyad.
-    #[serde(skip)]
-    pub(super) approach: Approach,
 }
 
 /// A column that says from which side a joint came.

@@ -48,7 +48,7 @@ impl Diagnosis {
         let model = ErrorModel {
             varying: Varying { directions: None, terms: all },
             dead_bands: by_command(machine, &facts.dead_bands),
-            approaches: self.stand_still.iter().map(|still| still.approach).collect(),
+            approaches: self.approaches.clone(),
             ..ErrorModel::default()
         };
         let (calibrated, fit) = calibrate_model(machine, recordings, &model, options, progress)?;

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::approaches::approaches;
+use super::approaches::{approaches, stand_still};
 use super::contained::says_no_more;
 use super::diagnosis::{Diagnosis, Named, SharedEffect, Thinned};
 use super::doubt::{CHANCE, Doubt, doubt, still};
@@ -313,6 +313,7 @@ impl Modelled {
         let in_model = [kept.as_slice(), &shared_effects, &parts].concat();
         let left_over = residual_of(search, &in_model);
         let set_ups_left_out = set_ups::left_out(search, &in_model, &placebos);
+        let approaches = approaches(search, &in_model);
         let (findings, mut named): (Vec<Finding>, Vec<Named>) =
             told.into_iter().map(|told| (told.finding, told.named)).unzip();
         named.extend(of_shared);
@@ -343,7 +344,8 @@ impl Modelled {
                     of_set_up: library.families()[c.family].each_setup,
                 })
                 .collect(),
-            stand_still: approaches(search, &in_model, machine),
+            stand_still: stand_still(search, &approaches, machine),
+            approaches,
             named,
             not_tried: Vec::new(),
             unseen_side_branches: Vec::new(),

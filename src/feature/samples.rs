@@ -63,13 +63,15 @@ impl Samples {
         })
     }
 
-    /// These samples as if every joint had turned round just before them.
+    /// These samples as if every joint had turned round just before it first moves: until then it has come from the other side.
     pub(crate) fn turned_before(&self) -> Samples {
         let mut turned = self.clone();
         for joint in turned.joints.iter_mut().flatten() {
             let unseen =
                 joint.since_reversal.iter_mut().zip(&joint.travelled).filter(|(since, _)| **since >= FAR);
             unseen.for_each(|(since, travelled)| *since = *travelled);
+            let standing = joint.direction.iter_mut().zip(&joint.travelled).filter(|(_, way)| **way == 0.0);
+            standing.for_each(|(direction, _)| *direction = -*direction);
         }
         turned
     }
@@ -169,7 +171,7 @@ pub struct Follow<'a, I> {
 /// Histories of all joints, `docs/effects.md` (43).
 #[derive(Clone)]
 pub(super) struct History {
-    /// Dyad, drive, dead band (m or rad), direction of the first motion.
+    /// Dyad, drive, dead band (m or rad), direction in which it came before it first moves.
     pub(super) joints: Vec<(usize, Drive, f64, i8)>,
     axes: Vec<Option<Axis>>,
     /// Whether the joint has turned round yet.
@@ -201,7 +203,7 @@ impl History {
     }
 
     pub(super) fn advance(&mut self, stated: impl Fn(usize) -> Option<i8>, displacements: &[f64]) {
-        for (i, (j, drive, band, _)) in self.joints.iter().enumerate() {
+        for (i, (j, drive, band, came)) in self.joints.iter().enumerate() {
             let q = displacements[*j];
             // A column of directions speaks of one command; of a joint that follows several it says nothing.
             let stated = match drive.terms.as_slice() {
@@ -209,9 +211,9 @@ impl History {
                 _ => None,
             };
             let axis = self.axes[i].get_or_insert_with(|| Axis::at(q));
-            let before = axis.direction;
+            let before = if axis.direction == 0 { *came } else { axis.direction };
             axis.advance(q, stated, *band);
-            self.turned[i] |= before != 0 && before != axis.direction;
+            self.turned[i] |= before != 0 && axis.direction != 0 && before != axis.direction;
             if self.last[i].is_finite() {
                 self.travelled[i] += (q - self.last[i]).abs();
             }

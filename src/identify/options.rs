@@ -131,7 +131,7 @@ impl ErrorModel {
     }
 }
 
-/// From which side a joint came that never moves in a recording.
+/// From which side a joint came before it first moves in a recording, or that never does; where nobody says so, in the direction of its first motion.
 #[non_exhaustive]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Approach {

@@ -58,7 +58,8 @@ impl Stretch {
 pub(crate) struct Beginning {
     /// Directions of the first motion by command.
     commands: Vec<i8>,
-    /// The same by dyad; empty where there are no features.
+    /// By dyad, the directions in which joints came before they move: those of the first motion, if nobody says otherwise; empty where there
+    /// are no features.
     dyads: Vec<i8>,
     /// Direction of gravity in the base frame, where it is not that of the machine file.
     pub gravity_b: Option<Vec3<f64>>,
@@ -86,10 +87,10 @@ impl Beginning {
         Ok(Beginning { commands: first.found(), dyads, gravity_b: gravity_of(recording, machine, None) })
     }
 
-    /// Features of the joint of dyad `j`, which never moves, are those behind a motion in this direction.
+    /// Until the joint of dyad `j` moves, if ever, its features are those behind a motion in this direction.
     pub fn approach(&mut self, j: usize, direction: i8) {
-        if let Some(first) = self.dyads.get_mut(j).filter(|first| **first == 0) {
-            *first = direction;
+        if let Some(came) = self.dyads.get_mut(j) {
+            *came = direction;
         }
     }
 }
