@@ -4,7 +4,7 @@ use super::diagnosis::{SaidBy, StandsStill};
 use super::held_out::Model;
 use super::search::Search;
 use super::terms::ModelTerm;
-use crate::feature::{Feature, Samples};
+use crate::feature::{Feature, JointSamples, Samples};
 use crate::identify::Approach;
 use crate::machine::Machine;
 
@@ -25,12 +25,12 @@ pub(super) fn approaches(search: &Search, kept: &[ModelTerm], machine: &Machine)
         let now = effects_of(search, kept, &model, i, &linear.samples);
         for j in joints {
             for (r, span) in linear.spans.iter().enumerate() {
-                let mut rising = linear.samples.clone();
-                let Some(joint) = &mut rising[r].joints[j] else { continue };
-                if joint.direction.iter().any(|direction| *direction != 0.0) {
+                let stands = |joint: &JointSamples| joint.direction.iter().all(|direction| *direction == 0.0);
+                if !linear.samples[r].joints[j].as_ref().is_some_and(stands) {
                     continue;
                 }
-                joint.direction.fill(1.0);
+                let mut rising = linear.samples.clone();
+                rising[r].joints[j].iter_mut().for_each(|joint| joint.direction.fill(1.0));
                 let rising = effects_of(search, kept, &model, i, &rising);
                 let (mut product, mut square) = (0.0, 0.0);
                 for row in span.rows.0..span.rows.1 {
