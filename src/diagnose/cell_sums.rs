@@ -214,7 +214,7 @@ mod tests {
         let answers = [0, 1].map(|a| (0..rows).map(|row| at(row, a)).collect::<Vec<f64>>());
         let features = [2, 3].map(|f| (0..cells).map(|c| at(c, f)).collect::<Vec<f64>>());
         let w = DMatrix::from_fn(rows, 9, |i, j| 0.1 * at(i, j + 5));
-        let panels: Vec<Panel> = Panel::of_transposed(&w.transpose());
+        let panels: Vec<Panel> = Panel::of_transposed(&[w.transpose()]);
         let left = DVector::from_fn(rows, |i, _| at(i, 20));
         let over = |values: &mut dyn Iterator<Item = f64>| {
             let mut sums = vec![0.0; cells];

@@ -377,7 +377,7 @@ impl<'a> Rows<'a> {
                 }
             }
             self.whiten(&mut joined);
-            judge(&joined.columns(0, k * built.len()), marginal, left, &built, &mut |i, equations| {
+            judge((&joined, k), marginal, left, &built, &mut |i, equations| {
                 table[i] = Some(best(candidate, &grid[i], &lengths, equations, overdispersion, usual));
             });
         }
