@@ -19,6 +19,16 @@ pub(super) struct Coarse {
     kept: Vec<OnceLock<Option<(usize, Features)>>>,
     /// Samples put together where joints stand alike, whenever that was.
     pub cells: AllCells,
+    /// Phases of the waves of each candidate, pair by pair, once they have been asked for.
+    pub(super) waves: Vec<OnceLock<Option<Vec<Wave>>>>,
+}
+
+/// Phase of a pair of features over the grid.
+pub(super) struct Wave {
+    /// Phase at every sample, over the largest.
+    pub(super) x: Vec<f64>,
+    /// The largest phase, at every point of the grid.
+    pub(super) factors: Vec<f64>,
 }
 
 /// Blocks of samples that stand for themselves.
@@ -56,6 +66,7 @@ impl Coarse {
             alike: alike(candidates),
             kept: candidates.iter().map(|_| OnceLock::new()).collect(),
             cells: AllCells::new(candidates.len()),
+            waves: candidates.iter().map(|_| OnceLock::new()).collect(),
         }
     }
 

@@ -31,8 +31,7 @@ pub(super) struct Rows<'a> {
     pub(super) coarse: &'a Coarse,
     columns: Mutex<HashMap<Key, Column>>,
     pub(super) coarse_columns: Mutex<HashMap<(usize, Key), Column>>,
-    /// Phases of waves by candidate, and energies of a candidate's pairs of features times an answer.
-    pub(super) waves: Mutex<HashMap<usize, Option<Arc<Vec<Wave>>>>>,
+    /// Energies of a candidate's pairs of features times an answer.
     pub(super) energies: Mutex<HashMap<(usize, usize, Key), Column>>,
     /// Whitened answers, and products of two of them summed over cells.
     white: Mutex<HashMap<Key, Column>>,
@@ -48,14 +47,8 @@ pub(super) struct Field {
     pub(super) coarse: Vec<OnceLock<(Marginal, DVector<f64>)>>,
     /// Sums of answers over cells, once they have been asked for.
     pub(super) cells: Mutex<HashMap<(usize, Key), Arc<CellSums>>>,
-}
-
-/// Phase of a pair of features over the grid.
-pub(super) struct Wave {
-    /// Phase at every sample, over the largest.
-    pub(super) x: Vec<f64>,
-    /// The largest phase, at every point of the grid.
-    pub(super) factors: Vec<f64>,
+    /// The residuals, whitened once more by the transposed, once they have been asked for.
+    pub(super) dual: OnceLock<Vec<f64>>,
 }
 
 /// Columns behind others of the same rows.
@@ -78,7 +71,6 @@ impl<'a> Rows<'a> {
             coarse,
             columns: Mutex::default(),
             coarse_columns: Mutex::default(),
-            waves: Mutex::default(),
             energies: Mutex::default(),
             white: Mutex::default(),
             cell_energies: Mutex::default(),
@@ -90,7 +82,7 @@ impl<'a> Rows<'a> {
         let marginal = marginal.into();
         let left = marginal.apply(&self.residual);
         let coarse = self.coarse.levels().iter().map(|_| OnceLock::new()).collect();
-        Field { marginal, left, coarse, cells: Mutex::default() }
+        Field { marginal, left, coarse, cells: Mutex::default(), dual: OnceLock::new() }
     }
 
     /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way.
