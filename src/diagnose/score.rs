@@ -6,12 +6,11 @@ use std::sync::{Arc, Mutex, OnceLock};
 use nalgebra::{DMatrix, DVector};
 
 use super::cells::CellSums;
-use super::coarse::Coarse;
+use super::coarse::{Coarse, OnLevel};
 use super::equations::{
     BATCH, Best, Column, Equations, Key, ROOM, Score, best, judge, key, lengths, unit_size,
 };
 use super::evidence::{log_mean_exp, rarity, sizes_up_to};
-use super::features::Features;
 use super::linear::Linear;
 use super::marginal::Marginal;
 use super::whitener::Whitener;
@@ -82,7 +81,13 @@ impl<'a> Rows<'a> {
         let marginal = marginal.into();
         let left = marginal.apply(&self.residual);
         let coarse = self.coarse.levels().iter().map(|_| OnceLock::new()).collect();
-        Field { marginal, left, coarse, cells: Mutex::default(), dual: OnceLock::new() }
+        Field {
+            marginal,
+            left,
+            coarse,
+            cells: Mutex::default(),
+            dual: OnceLock::new(),
+        }
     }
 
     /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way.
@@ -347,14 +352,22 @@ impl<'a> Rows<'a> {
         candidate: &Candidate,
         grid: &[Vec<f64>],
         field: &Field,
-        kept: Option<&(usize, Features)>,
+        kept: Option<&OnLevel>,
         overdispersion: f64,
         points: &[usize],
         table: &mut [Option<Best>],
     ) {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
-        if let Some((level, kept)) = kept {
-            return self.coarse_table(candidate, grid, field, (*level, kept), overdispersion, points, table);
+        if let Some(kept) = kept {
+            return match &kept.groups {
+                Some(groups) => {
+                    self.group_table(candidate, field, (kept.level, groups), overdispersion, points, table)
+                }
+                None => {
+                    let on = (kept.level, &kept.features);
+                    self.coarse_table(candidate, grid, field, on, overdispersion, points, table)
+                }
+            };
         }
         let (marginal, left) = (&*field.marginal, &field.left);
         let usual = self.usual_sizes(candidate, grid);
