@@ -41,6 +41,7 @@ mod outliers;
 mod panel;
 mod parts;
 mod passing;
+mod past;
 mod pictures;
 mod placebo;
 mod policy;

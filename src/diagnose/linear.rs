@@ -1,11 +1,13 @@
 //! The calibrated machine as a linear model around its optimum: residuals, and how each reading answers to a small twist of every
 //! frame, before and behind its joint. What a diagnosis works on.
 
-use std::sync::OnceLock;
+use std::collections::HashMap;
+use std::sync::{Mutex, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::equations::Column;
 use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
 use crate::identify::{
@@ -68,6 +70,8 @@ pub(super) struct Linear {
     pub samples: Vec<Samples>,
     /// The same as if every joint had turned round just before, once it has been asked for.
     turned: OnceLock<Vec<Samples>>,
+    /// Curves of what was there before each joint first turned round, by whether it lasts, and of its sides, once they have been asked for.
+    pub(super) pasts: Mutex<PastCurves>,
     /// Every so manieth sample of the recordings was taken, of so many.
     pub every: u64,
     pub all_samples: u64,
@@ -76,6 +80,9 @@ pub(super) struct Linear {
     /// Where the machine is linearised.
     unknowns: Unknowns,
 }
+
+/// Two sets of curves by joint and by whether its past lasts.
+pub(super) type PastCurves = HashMap<(usize, bool), [Vec<Column>; 2]>;
 
 /// Where a machine is to be linearised anew.
 pub(super) struct Displaced {
@@ -236,6 +243,7 @@ fn rows(
         constant: DMatrix::zeros(count, columns.count()),
         samples: Vec::new(),
         turned: OnceLock::new(),
+        pasts: Mutex::default(),
         every,
         all_samples: sources.samples(),
         tolerated: vec![(None, 0.0); columns.count()],

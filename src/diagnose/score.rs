@@ -13,6 +13,7 @@ use super::equations::{
 use super::evidence::{log_mean_exp, rarity, sizes_up_to};
 use super::linear::Linear;
 use super::marginal::Marginal;
+use super::past::Pasts;
 use super::whitener::Whitener;
 use crate::effects::Candidate;
 use crate::lie::Twist;
@@ -48,6 +49,8 @@ pub(super) struct Field {
     pub(super) cells: Mutex<HashMap<(usize, Key), Arc<CellSums>>>,
     /// The residuals, whitened once more by the transposed, once they have been asked for.
     pub(super) dual: OnceLock<Vec<f64>>,
+    /// What all effects of a history at a joint have, by their directions.
+    pub(super) pasts: Mutex<Pasts>,
 }
 
 /// Columns behind others of the same rows.
@@ -87,6 +90,7 @@ impl<'a> Rows<'a> {
             coarse,
             cells: Mutex::default(),
             dual: OnceLock::new(),
+            pasts: Mutex::default(),
         }
     }
 
