@@ -41,6 +41,7 @@ mod outliers;
 mod panel;
 mod parts;
 mod passing;
+mod past;
 mod pictures;
 mod placebo;
 mod policy;
@@ -134,12 +135,23 @@ pub fn diagnose(
 ) -> Result<Diagnosis> {
     // Threads tell what they do; the one that asked hears of it.
     let (tell, told) = std::sync::mpsc::channel::<String>();
-    std::thread::scope(|scope| {
-        let search = scope.spawn(move || {
-            // Nobody listens any more only where the other side has panicked.
-            search_all(machine, recordings, library, request, &move |text| drop(tell.send(text.into())))
+    // Nobody listens any more only where the other side has panicked.
+    let search =
+        move || search_all(machine, recordings, library, request, &move |text| drop(tell.send(text.into())));
+    let listen = || told.iter().for_each(|text| progress(&text));
+    // Among the threads that share the work: from outside, each piece of it would be handed over and waited for. One of them cannot listen
+    // meanwhile.
+    if rayon::current_thread_index().is_none() {
+        let mut said = None;
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| said = Some(search()));
+            listen();
         });
-        told.iter().for_each(|text| progress(&text));
+        return said.expect("the scope waits for it");
+    }
+    std::thread::scope(|scope| {
+        let search = scope.spawn(search);
+        listen();
         search.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
 }

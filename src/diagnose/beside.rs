@@ -6,6 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use super::discrepancy::seen;
 use super::equations::Equations;
 use super::marginal::{Marginal, square, with_prior, worth_of};
+use super::past::Past;
+use super::score::Rows;
 use super::terms::side_by_side;
 
 /// Products of sets of whitened columns, set by set.
@@ -29,6 +31,60 @@ impl Beside {
         let gram = &own - square(&along);
         let counts = sets.iter().map(|set| set.ncols()).collect();
         Beside { counts, own, gram, toward: columns.tr_mul(left) }
+    }
+
+    /// The same where columns of a history are among the first sets, so many from the first on, each set's before its own columns. `scales`: of
+    /// the history's columns in each of these.
+    pub fn with_past(
+        rows: &Rows,
+        (past, scales): (&Past, &[f64]),
+        sets: &[&DMatrix<f64>],
+        marginal: &Marginal,
+        left: &DVector<f64>,
+    ) -> Self {
+        let of_past = [past.before, past.toward.len() - past.before];
+        let known: usize = of_past[..scales.len()].iter().sum();
+        let columns = side_by_side(sets, left.len());
+        let (along, of_own) = (marginal.along(&columns.as_view()), columns.ncols());
+        let across = past.across(rows, &columns);
+        let across = across.rows(0, known);
+        let past_along = past.along.columns(0, known);
+        let whole = |known_part: DMatrix<f64>, across: DMatrix<f64>, own: DMatrix<f64>| {
+            let mut all = DMatrix::zeros(known + of_own, known + of_own);
+            all.view_mut((0, 0), (known, known)).copy_from(&known_part);
+            all.view_mut((0, known), (known, of_own)).copy_from(&across);
+            all.view_mut((known, 0), (of_own, known)).tr_copy_from(&across);
+            all.view_mut((known, known), (of_own, of_own)).copy_from(&own);
+            all
+        };
+        let past_own = past.own.view((0, 0), (known, known)).into_owned();
+        let own = square(&columns);
+        let gram = whole(
+            &past_own - square(&past_along.into_owned()),
+            across - past_along.tr_mul(&along),
+            &own - square(&along),
+        );
+        let own = whole(past_own, across.into_owned(), own);
+        let mut toward = DVector::zeros(known + of_own);
+        toward.rows_mut(0, known).copy_from(&past.toward.rows(0, known));
+        toward.rows_mut(known, of_own).copy_from(&columns.tr_mul(left));
+        // Set by set.
+        let (mut order, mut by, mut counts) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut first, mut own_first) = (0, known);
+        for (set, columns) in sets.iter().enumerate() {
+            let of_past = scales.get(set).map_or(0, |_| of_past[set]);
+            order.extend((first..first + of_past).chain(own_first..own_first + columns.ncols()));
+            by.extend(vec![scales.get(set).copied().unwrap_or(1.0); of_past]);
+            by.extend(vec![1.0; columns.ncols()]);
+            counts.push(of_past + columns.ncols());
+            (first, own_first) = (first + of_past, own_first + columns.ncols());
+        }
+        let count = order.len();
+        let turned = |of: &DMatrix<f64>| {
+            DMatrix::from_fn(count, count, |i, j| by[i] * by[j] * of[(order[i], order[j])])
+        };
+        let toward = DVector::from_fn(count, |i, _| by[i] * toward[order[i]]);
+        Beside { counts, own: turned(&own), gram: turned(&gram), toward }
     }
 
     /// With the first sets, so many, without the combinations of their columns that noise hides.

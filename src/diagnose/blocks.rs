@@ -64,7 +64,7 @@ impl Rows<'_> {
                 let Some(features) = kept.at(*i) else { continue };
                 on_blocks(candidate, level, &answers, &features, &mut joined.columns_mut(b * k, k), true);
             }
-            judge(&joined.columns(0, k * batch.len()), marginal, left, batch, &mut |i, equations| {
+            judge((&joined, k), marginal, left, batch, &mut |i, equations| {
                 table[i] = Some(best(candidate, &grid[i], &lengths, equations, overdispersion, usual));
             });
         }

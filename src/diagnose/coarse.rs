@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use super::cells::{AllCells, answers};
 use super::equations::root_mean_square;
-use super::features::{AtPoint, Features, is_near};
+use super::features::{AtPoint, Features, Groups, is_near};
 use super::linear::Linear;
 use super::panel::{Panel, WIDTH};
 use crate::effects::Candidate;
@@ -15,10 +15,28 @@ pub(super) struct Coarse {
     levels: Vec<Level>,
     /// The first candidate that has the features of each over the same grid: what goes by the clock is alike at every frame.
     alike: Vec<usize>,
-    /// Features of each candidate over its grid, once they have been asked for, and the level that they are for.
-    kept: Vec<OnceLock<Option<(usize, Features)>>>,
+    /// Features of each candidate over its grid, once they have been asked for.
+    kept: Vec<OnceLock<Option<OnLevel>>>,
     /// Samples put together where joints stand alike, whenever that was.
     pub cells: AllCells,
+    /// Phases of the waves of each candidate, pair by pair, once they have been asked for.
+    pub(super) waves: Vec<OnceLock<Option<Vec<Wave>>>>,
+}
+
+/// Features of a candidate on the blocks of a level.
+pub(super) struct OnLevel {
+    pub level: usize,
+    pub features: Features,
+    /// The same with blocks together that are alike, where those are many.
+    pub groups: Option<Groups>,
+}
+
+/// Phase of a pair of features over the grid.
+pub(super) struct Wave {
+    /// Phase at every sample, over the largest.
+    pub(super) x: Vec<f64>,
+    /// The largest phase, at every point of the grid.
+    pub(super) factors: Vec<f64>,
 }
 
 /// Blocks of samples that stand for themselves.
@@ -56,6 +74,7 @@ impl Coarse {
             alike: alike(candidates),
             kept: candidates.iter().map(|_| OnceLock::new()).collect(),
             cells: AllCells::new(candidates.len()),
+            waves: candidates.iter().map(|_| OnceLock::new()).collect(),
         }
     }
 
@@ -68,11 +87,14 @@ impl Coarse {
         self.alike[i]
     }
 
-    /// Features of candidate `i` over its grid, if they change little within a block, with the number of the level.
-    pub fn features(&self, i: usize, candidate: &Candidate, fine: &[Samples]) -> Option<&(usize, Features)> {
+    /// Features of candidate `i` over its grid, if they change little within a block of some level.
+    pub fn features(&self, i: usize, candidate: &Candidate, fine: &[Samples]) -> Option<&OnLevel> {
         let first = || {
-            (self.levels.iter().enumerate())
-                .find_map(|(l, level)| Some((l, level.evaluate(candidate, fine)?)))
+            let on = |(level, of): (usize, &Level)| {
+                let features = of.evaluate(candidate, fine)?;
+                Some(OnLevel { level, groups: features.grouped(), features })
+            };
+            self.levels.iter().enumerate().find_map(on)
         };
         self.kept[i].get_or_init(first).as_ref()
     }

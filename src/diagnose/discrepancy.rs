@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::curves::{column, product, squares};
 use super::equations::Column;
+use super::linear::Linear;
 use super::marginal::square;
 use super::score::Rows;
 use super::terms::ModelTerm;
@@ -20,7 +21,7 @@ use crate::lie::Twist;
 use crate::variation::Slot;
 
 /// A column of the shape may have this part of the effect's amplitude.
-const PART: f64 = 0.3;
+pub(super) const PART: f64 = 0.3;
 /// Shapes that are smaller than this part of the noise, all rows together, are left aside.
 const HIDDEN: f64 = 0.2;
 /// A function of position with so many coefficients may bend as it likes.
@@ -29,6 +30,10 @@ pub(super) const BENDS: usize = 3;
 const CURVE: usize = 12;
 /// Orders of what multiplies the effect's own features.
 const WANDER: usize = 3;
+/// Curves of position that differ by side.
+const SIDES: usize = 5;
+/// Curves of a joint's history with more numbers than this are not kept.
+const MOST_KEPT: usize = 1 << 20;
 /// Travel over which something decays after a reversal, as parts of the range of travel.
 const DECAYS: [f64; 5] = [0.003, 0.01, 0.03, 0.1, 0.3];
 /// The same for what is remembered of the time before a recording.
@@ -46,8 +51,19 @@ pub(super) fn shape(
     in_model: &ModelTerm,
     answers: Vec<Column>,
 ) -> Unmixed {
-    let curves = curves(rows, candidate, &in_model.score.parameters);
-    whitened(rows, answers, curves, PART * amplitude(in_model))
+    let curves = curves(rows, candidate, &in_model.score.parameters, true);
+    whitened(rows, answers, curves.into_iter().map(Arc::new).collect(), PART * amplitude(in_model))
+}
+
+/// The same without those columns that every effect of the same history has, [`past_curves`].
+pub(super) fn own_shape(
+    rows: &Rows,
+    candidate: &Candidate,
+    in_model: &ModelTerm,
+    answers: Vec<Column>,
+) -> Unmixed {
+    let curves = curves(rows, candidate, &in_model.score.parameters, false);
+    whitened(rows, answers, curves.into_iter().map(Arc::new).collect(), PART * amplitude(in_model))
 }
 
 /// Columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
@@ -58,43 +74,63 @@ pub(super) fn initial_conditions(
     in_model: &ModelTerm,
     answers: Vec<Column>,
 ) -> Unmixed {
-    let stretches = &rows.linear.samples;
-    let mut curves: Vec<Vec<f64>> = Vec::new();
     let with_history = candidate.features.iter().filter(|f| f.needs_history());
-    for (j, lasts) in with_history.flat_map(|f| f.joints().into_iter().map(|j| (j, f.remembers()))) {
-        let since = column(stretches, j, |c| &c.since_reversal);
-        let travelled = column(stretches, j, |c| &c.travelled);
-        let range = extent(&column(stretches, j, |c| &c.position));
-        let mut first = 0;
-        let early = |s: &Samples| {
-            let own = s.joints[j].iter().flat_map(|of| &of.since_reversal);
-            own.filter(|since| lasts || **since >= UNKNOWN).count()
-        };
-        let taken = longest(&stretches.iter().map(early).collect::<Vec<usize>>());
-        for (at, stretch) in stretches.iter().enumerate() {
-            let own = first..first + stretch.len;
-            first = own.end;
-            if taken.binary_search(&at).is_err() {
-                continue;
-            }
-            let before = |part: f64| -> Vec<f64> {
-                // What is taken up gradually does not end where the joint turns round.
-                let unknown = |k: &usize| own.contains(k) && (lasts || since[*k] >= UNKNOWN);
-                let decay = |k: usize| (-travelled[k] / (part * range)).exp();
-                (0..since.len()).map(|k| if unknown(&k) { decay(k) } else { 0.0 }).collect()
-            };
-            let stands_still = travelled[own.clone()].iter().all(|x| *x < EARLY[0] * range);
-            match stands_still {
-                true => curves.push(before(1.0)),
-                false => curves.extend(EARLY.map(before)),
-            }
-        }
+    let pasts = with_history.flat_map(|f| f.joints().into_iter().map(|j| (j, f.remembers())));
+    let known = |of| past_curves(rows.linear, of).map(|[before, _]| before);
+    let before = |of: (usize, bool)| known(of).unwrap_or_else(|| beginnings(rows.linear, of.0, of.1));
+    let mut curves: Vec<Column> = pasts.flat_map(before).collect();
+    curves.extend(turns(rows, candidate, &in_model.score.parameters));
+    whitened(rows, answers, curves, amplitude(in_model))
+}
+
+/// The same without those columns that every effect of the same history has, [`past_curves`].
+pub(super) fn own_initial_conditions(
+    rows: &Rows,
+    candidate: &Candidate,
+    in_model: &ModelTerm,
+    answers: Vec<Column>,
+) -> Unmixed {
+    whitened(rows, answers, turns(rows, candidate, &in_model.score.parameters), amplitude(in_model))
+}
+
+/// The joint of an effect that depends on that joint alone and on which way it has come, whether that lasts, and how many of its features do so
+/// alike; `None` where they differ.
+pub(super) fn history(candidate: &Candidate) -> Option<(usize, bool, usize)> {
+    let features = &candidate.features;
+    let joint = features.iter().find_map(|f| f.joints().first().copied())?;
+    let with_history: Vec<&Feature> = features.iter().filter(|f| f.needs_history()).collect();
+    let lasts = with_history.first()?.remembers();
+    let is_alike = features.iter().flat_map(Feature::joints).all(|j| j == joint)
+        && with_history.iter().all(|f| f.joints().len() == 1 && f.remembers() == lasts);
+    is_alike.then_some((joint, lasts, with_history.len()))
+}
+
+/// What all effects of a history have: curves of what was there before anybody looked, and of what their shape may be; `None` where these would be
+/// too many to be kept.
+pub(super) fn past_curves(linear: &Linear, of: (usize, bool)) -> Option<[Vec<Column>; 2]> {
+    let recordings = linear.spans.len().min(BEGINNINGS);
+    if (EARLY.len() * recordings + SIDES + DECAYS.len()) * linear.lines.len() > MOST_KEPT {
+        return None;
     }
+    // Never held while other work is done: a thread may take another's up meanwhile.
+    if let Some(known) = linear.pasts.lock().ok().and_then(|map| map.get(&of).cloned()) {
+        return Some(known);
+    }
+    let sides = sides(&linear.samples, of.0).into_iter().map(Arc::new).collect();
+    let curves = [beginnings(linear, of.0, of.1), sides];
+    if let Ok(mut map) = linear.pasts.lock() {
+        map.insert(of, curves.clone());
+    }
+    Some(curves)
+}
+
+/// How an effect changes where joints have turned round just before each recording, of every recording for itself.
+fn turns(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Column> {
+    let (stretches, mut curves) = (&rows.linear.samples, Vec::new());
     // Machines that stand before a recording may have turned round just there.
-    let turned = rows.linear.turned_before();
-    for feature in candidate.features.iter().filter(|f| f.needs_history()) {
-        let parameters = &in_model.score.parameters;
-        let (with, without) = (feature.over(turned, parameters), feature.over(stretches, parameters));
+    for feature in candidate.features.iter().filter(|f| f.sees_reversals()) {
+        let with = feature.over(rows.linear.turned_before(), parameters);
+        let without = feature.over(stretches, parameters);
         let change: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();
         let (mut first, mut lengths) = (0, Vec::new());
         for stretch in stretches {
@@ -109,11 +145,44 @@ pub(super) fn initial_conditions(
             first = own.end;
             if taken.binary_search(&at).is_ok() && change[own.clone()].iter().any(|x| x.abs() > 0.0) {
                 let only = |k: usize| if own.contains(&k) { change[k] } else { 0.0 };
-                curves.push((0..change.len()).map(only).collect());
+                curves.push(Arc::new((0..change.len()).map(only).collect()));
             }
         }
     }
-    whitened(rows, answers, curves, amplitude(in_model))
+    curves
+}
+
+/// What was there before joint `j` first turned round in a recording: curves that decay as it goes on, of every recording for itself. `lasts`:
+/// what is taken up gradually does not end where the joint turns round.
+fn beginnings(linear: &Linear, j: usize, lasts: bool) -> Vec<Column> {
+    let (stretches, mut curves) = (&linear.samples, Vec::new());
+    let since = column(stretches, j, |c| &c.since_reversal);
+    let travelled = column(stretches, j, |c| &c.travelled);
+    let range = extent(&column(stretches, j, |c| &c.position));
+    let mut first = 0;
+    let early = |s: &Samples| {
+        let own = s.joints[j].iter().flat_map(|of| &of.since_reversal);
+        own.filter(|since| lasts || **since >= UNKNOWN).count()
+    };
+    let taken = longest(&stretches.iter().map(early).collect::<Vec<usize>>());
+    for (at, stretch) in stretches.iter().enumerate() {
+        let own = first..first + stretch.len;
+        first = own.end;
+        if taken.binary_search(&at).is_err() {
+            continue;
+        }
+        let before = |part: f64| -> Column {
+            let unknown = |k: &usize| own.contains(k) && (lasts || since[*k] >= UNKNOWN);
+            let decay = |k: usize| (-travelled[k] / (part * range)).exp();
+            Arc::new((0..since.len()).map(|k| if unknown(&k) { decay(k) } else { 0.0 }).collect())
+        };
+        let stands_still = travelled[own.clone()].iter().all(|x| *x < EARLY[0] * range);
+        match stands_still {
+            true => curves.push(before(1.0)),
+            false => curves.extend(EARLY.map(before)),
+        }
+    }
+    curves
 }
 
 /// The recordings whose beginnings last longest, in their order: all of them where there are not too many.
@@ -127,7 +196,7 @@ pub(super) fn longest(lengths: &[usize]) -> Vec<usize> {
 }
 
 /// Norm of what an effect does to the whitened rows.
-fn amplitude(in_model: &ModelTerm) -> f64 {
+pub(super) fn amplitude(in_model: &ModelTerm) -> f64 {
     (&in_model.columns * &in_model.solution).norm()
 }
 
@@ -136,9 +205,9 @@ pub(super) struct Unmixed {
     /// Whitened.
     pub white: DMatrix<f64>,
     /// Which answer and curve they were made of, and by what they were multiplied.
-    made_of: Vec<(usize, usize, f64)>,
+    pub made_of: Vec<(usize, usize, f64)>,
     answers: Vec<Column>,
-    curves: Vec<Vec<f64>>,
+    curves: Vec<Column>,
 }
 
 impl Unmixed {
@@ -161,14 +230,15 @@ pub(super) struct Columns {
 impl Columns {
     /// As they are, m and rad.
     pub fn raw(&self, rows: &Rows) -> DMatrix<f64> {
-        let mut raw = DMatrix::zeros(self.white.nrows(), self.white.ncols());
-        let mut numbers = vec![0.0; self.white.ncols()];
-        for (c, mut column) in raw.column_iter_mut().enumerate() {
-            numbers[c] = 1.0;
-            column.copy_from_slice(&self.sum(rows, &numbers));
-            numbers[c] = 0.0;
+        let Unmixed { made_of, answers, curves, .. } = &self.of;
+        let mut unmixed = DMatrix::zeros(self.white.nrows(), made_of.len());
+        for ((answer, curve, scale), mut column) in made_of.iter().zip(unmixed.column_iter_mut()) {
+            let (answer, curve) = (&answers[*answer], &curves[*curve]);
+            for ((x, a), sample) in column.iter_mut().zip(answer.iter()).zip(&rows.linear.sample) {
+                *x = scale * a * curve[*sample];
+            }
         }
-        raw
+        unmixed * &self.mixture
     }
 
     /// As they are, m and rad, each times its number, added up.
@@ -187,7 +257,7 @@ impl Columns {
 }
 
 /// Columns of answers times curves, each of this norm.
-fn whitened(rows: &Rows, answers: Vec<Column>, curves: Vec<Vec<f64>>, amplitude: f64) -> Unmixed {
+pub(super) fn whitened(rows: &Rows, answers: Vec<Column>, curves: Vec<Column>, amplitude: f64) -> Unmixed {
     let n = rows.residual.len();
     let mut made_of: Vec<(usize, usize, f64)> =
         (0..answers.len()).flat_map(|a| (0..curves.len()).map(move |c| (a, c, 0.0))).collect();
@@ -202,7 +272,7 @@ fn whitened(rows: &Rows, answers: Vec<Column>, curves: Vec<Vec<f64>>, amplitude:
                 let answers = answers[*a].iter();
                 // One reading a sample: a row is its sample.
                 if curve.len() == n {
-                    let both = plain.iter_mut().zip(answers).zip(curve);
+                    let both = plain.iter_mut().zip(answers).zip(curve.iter());
                     both.for_each(|((plain, answer), x)| *plain = answer * x);
                     continue;
                 }
@@ -316,8 +386,8 @@ fn index_of(x: &[f64], extreme: impl Fn(f64, f64) -> f64) -> Option<usize> {
     x.iter().position(|x| *x == value)
 }
 
-/// Answers of the readings to each direction of the effect.
-pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Column> {
+/// The directions of the effect, each once.
+pub(super) fn directions(candidate: &Candidate, in_model: &ModelTerm) -> Vec<(Slot, Twist<f64>)> {
     let mut distinct: Vec<(Slot, Twist<f64>)> = Vec::new();
     for part in candidate.coefficients[..in_model.score.coefficients].iter().flat_map(|c| &c.parts) {
         let is_known = distinct.iter().any(|(slot, d)| *slot == part.slot && *d == part.direction);
@@ -325,7 +395,12 @@ pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTe
             distinct.push((part.slot, part.direction));
         }
     }
-    distinct.iter().map(|(slot, d)| rows.answer(*slot, *d)).collect()
+    distinct
+}
+
+/// Answers of the readings to each direction of the effect.
+pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Column> {
+    directions(candidate, in_model).into_iter().map(|(slot, d)| rows.answer(slot, d)).collect()
 }
 
 /// The same, or of many directions to the mixture of them that was found.
@@ -349,8 +424,22 @@ pub(super) fn answers(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) 
 /// Distance since a reversal that nobody has seen, m or rad.
 pub(super) const UNKNOWN: f64 = 1e5;
 
-/// Other functions of what the effect's features depend on, at every sample.
-fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64>> {
+/// Any function of position and side that decays after a reversal or does not.
+fn sides(stretches: &[Samples], j: usize) -> Vec<Vec<f64>> {
+    let position = column(stretches, j, |c| &c.position);
+    let direction = column(stretches, j, |c| &c.direction);
+    let since = column(stretches, j, |c| &c.since_reversal);
+    let range = extent(&position);
+    let decays = DECAYS.map(|part| {
+        let decay: Vec<f64> = since.iter().map(|s| (-s / (part * range)).max(-200.0).exp()).collect();
+        product(&direction, &decay)
+    });
+    let along = chebyshev(SIDES - 1, &rescaled(&position));
+    along.iter().map(|t| product(&direction, t)).chain(decays).collect()
+}
+
+/// Other functions of what the effect's features depend on, at every sample; with sides or without.
+fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64], with_sides: bool) -> Vec<Vec<f64>> {
     let stretches = &rows.linear.samples;
     let features = &candidate.features;
     let any = |test: &dyn Fn(&Feature) -> bool| features.iter().any(test);
@@ -409,15 +498,7 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Vec<f64
                 ]);
             }
             if history {
-                let direction = column(stretches, *j, |c| &c.direction);
-                let since = column(stretches, *j, |c| &c.since_reversal);
-                let range = extent(&column(stretches, *j, |c| &c.position));
-                curves.extend(chebyshev(4, &position).iter().map(|t| product(&direction, t)));
-                for part in DECAYS {
-                    let decay: Vec<f64> =
-                        since.iter().map(|s| (-s / (part * range)).max(-200.0).exp()).collect();
-                    curves.push(product(&direction, &decay));
-                }
+                curves.extend(if with_sides { sides(stretches, *j) } else { Vec::new() });
             } else if !rates && !is_wave {
                 curves.extend(chebyshev(CURVE, &position).drain(1..));
             }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::evidence::{Worth, evidence, log_mean_exp};
-use super::marginal::Marginal;
+use super::marginal::{Marginal, square, square_of};
 use crate::effects::{Candidate, Coefficient};
 use crate::feature::Dimension;
 use crate::lie::Twist;
@@ -42,9 +42,27 @@ pub(super) struct Equations {
 impl Equations {
     /// `along`: what the marginal takes of the columns.
     pub fn of(columns: &DMatrixView<f64>, along: &DMatrixView<f64>, toward: DVector<f64>) -> Self {
-        let (own, taken) = match columns.ncols() > WIDE {
-            true => (columns.transpose() * columns, along.transpose() * along),
-            false => (squares(columns), squares(along)),
+        Self::with_square(squares(columns), along, toward)
+    }
+
+    /// The same of columns that lie one behind the other.
+    fn of_slice(
+        columns: &[f64],
+        shape: (usize, usize),
+        along: &DMatrixView<f64>,
+        toward: DVector<f64>,
+    ) -> Self {
+        let own = match shape.1 > WIDE {
+            true => square_of(columns, shape),
+            false => squares(&DMatrixView::from_slice(columns, shape.0, shape.1)),
+        };
+        Self::with_square(own, along, toward)
+    }
+
+    fn with_square(own: DMatrix<f64>, along: &DMatrixView<f64>, toward: DVector<f64>) -> Self {
+        let taken = match along.ncols() > WIDE {
+            true => square(&along.into_owned()),
+            false => squares(along),
         };
         Equations { whole: own.diagonal(), gram: own - taken, toward }
     }
@@ -102,19 +120,20 @@ pub(super) struct Score {
     pub room: f64,
 }
 
-/// Judges columns, as many for each of these points, beside a marginal.
+/// Judges the first columns, so many for each of these points, beside a marginal.
 pub(super) fn judge(
-    joined: &DMatrixView<f64>,
+    (joined, k): (&DMatrix<f64>, usize),
     marginal: &Marginal,
     left: &DVector<f64>,
     points: &[usize],
     take: &mut Take,
 ) {
-    let k = joined.ncols() / points.len().max(1);
-    let (along, toward) = (marginal.along(joined), joined.tr_mul(left));
+    let (rows, used) = (joined.nrows(), joined.columns(0, k * points.len()));
+    let (along, toward) = (marginal.along(&used), used.tr_mul(left));
     for (b, i) in points.iter().enumerate() {
-        let (own, columns) = (along.columns(b * k, k), joined.columns(b * k, k));
-        take(*i, &Equations::of(&columns, &own, toward.rows(b * k, k).into_owned()));
+        let columns = &joined.as_slice()[b * k * rows..(b + 1) * k * rows];
+        let toward = toward.rows(b * k, k).into_owned();
+        take(*i, &Equations::of_slice(columns, (rows, k), &along.columns(b * k, k), toward));
     }
 }
 
@@ -129,14 +148,19 @@ pub(super) fn best(
 ) -> Best {
     let lengths = if candidate.has_overtones(at) { lengths } else { &lengths[..1] };
     let Equations { gram, toward, .. } = equations;
-    let all: Vec<Worth> =
-        lengths.iter().map(|length| evidence(gram, toward, *length, overdispersion, usual)).collect();
+    let of = |length: usize| evidence(gram, toward, length, overdispersion, usual);
+    let told = |evidence: f64, length: usize, Worth { gain, size, .. }: Worth| {
+        let room = if size > 1.0 { ROOM_BEYOND * size } else { ROOM };
+        Best { evidence, length, gain, room, is_faint: equations.is_faint(length) }
+    };
+    if let [length] = lengths {
+        let only = of(*length);
+        return told(only.evidence, *length, only);
+    }
+    let all: Vec<Worth> = lengths.iter().map(|length| of(*length)).collect();
     let values: Vec<f64> = all.iter().map(|worth| worth.evidence).collect();
     let best = (0..all.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap_or(0);
-    let Worth { gain, size, .. } = all[best];
-    let room = if size > 1.0 { ROOM_BEYOND * size } else { ROOM };
-    let is_faint = equations.is_faint(lengths[best]);
-    Best { evidence: log_mean_exp(&values), length: lengths[best], gain, room, is_faint }
+    told(log_mean_exp(&values), lengths[best], all[best])
 }
 
 impl Score {

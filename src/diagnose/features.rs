@@ -8,6 +8,8 @@ use crate::feature::Samples;
 const ROUGH: f64 = 0.2;
 /// Features vanish below this part of their largest value.
 const VANISHES: f64 = 1e-6;
+/// Samples are put together where so many to one are alike.
+const ALIKE: usize = 4;
 /// Candidates with more numbers than this are not kept.
 const MOST_KEPT: usize = 40_000_000;
 
@@ -23,6 +25,14 @@ pub(super) struct Features {
     rms: Vec<f64>,
     features: usize,
     samples: usize,
+}
+
+/// Samples that are alike over the whole grid, put together.
+pub(super) struct Groups {
+    /// Group of each sample.
+    pub group: Vec<usize>,
+    /// On the groups.
+    pub features: Features,
 }
 
 /// Features of one point.
@@ -52,6 +62,11 @@ impl AtPoint<'_> {
 }
 
 impl Features {
+    /// How many samples there are.
+    pub fn samples(&self) -> usize {
+        self.samples
+    }
+
     /// Of one point; `None` where a value is not finite.
     pub fn at(&self, point: usize) -> Option<AtPoint<'_>> {
         let is_finite = self.points[point].2;
@@ -94,6 +109,69 @@ impl Features {
         };
         kept.rms = (0..kept.points.len()).flat_map(each).collect();
         Some(kept)
+    }
+
+    /// The same where samples that follow each other and are alike at every point stand together, as those do between moments at which something
+    /// may slip; `None` where that would be no fewer than so many to one.
+    pub fn grouped(&self) -> Option<Groups> {
+        let is_fine =
+            |begins: &[bool]| begins.iter().filter(|begins| **begins).count() * ALIKE > self.samples;
+        let mut begins = vec![false; self.samples];
+        for point in 0..self.points.len() {
+            let (at, mut from) = (self.values(point), 0);
+            for (first, count) in at.runs {
+                begins[*first] = true;
+                if let Some(behind) = begins.get_mut(first + count) {
+                    *behind = true;
+                }
+                for column in &at.columns {
+                    let own = &column[from..from + count];
+                    let changes =
+                        own.windows(2).zip(&mut begins[first + 1..]).filter(|(two, _)| two[0] != two[1]);
+                    changes.for_each(|(_, begins)| *begins = true);
+                }
+                from += count;
+            }
+            // Most are never alike, as the first point tells.
+            if point == 0 && is_fine(&begins) {
+                return None;
+            }
+        }
+        begins[..self.samples.min(1)].fill(true);
+        if is_fine(&begins) {
+            return None;
+        }
+        let firsts: Vec<usize> = (0..self.samples).filter(|k| begins[*k]).collect();
+        let mut groups = Features {
+            values: Vec::new(),
+            points: Vec::new(),
+            runs: Vec::new(),
+            rms: self.rms.clone(),
+            features: self.features,
+            samples: firsts.len(),
+        };
+        let mut columns = vec![Vec::new(); self.features];
+        for point in 0..self.points.len() {
+            let (at, mut from) = (self.values(point), 0);
+            columns.iter_mut().for_each(|column| {
+                column.clear();
+                column.resize(self.samples, 0.0);
+            });
+            for (first, count) in at.runs {
+                for (to, own) in columns.iter_mut().zip(&at.columns) {
+                    let own = &own[from..from + count];
+                    to[*first..first + count].iter_mut().zip(own).for_each(|(to, x)| *to = f64::from(*x));
+                }
+                from += count;
+            }
+            groups.push(&columns, |k| firsts[k]);
+        }
+        groups.values.shrink_to_fit();
+        let group = begins.iter().scan(0, |count, begins| {
+            *count += usize::from(*begins);
+            Some(*count - 1)
+        });
+        Some(Groups { group: group.collect(), features: groups })
     }
 
     /// Puts a point behind the others.
@@ -140,4 +218,47 @@ pub(super) fn is_near(column: &[f64], stands: impl Iterator<Item = f64>) -> bool
         all += x * x;
     }
     off <= ROUGH * ROUGH * all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_that_are_alike_over_the_whole_grid_stand_together() {
+        const SAMPLES: usize = 40;
+        let nothing = || Features {
+            values: Vec::new(),
+            points: Vec::new(),
+            runs: Vec::new(),
+            rms: Vec::new(),
+            features: 2,
+            samples: SAMPLES,
+        };
+        let step = |at: usize, size: f64| (0..SAMPLES).map(|k| if k < at { 0.0 } else { size }).collect();
+        let mut steps = nothing();
+        for at in [7, 20, 33] {
+            steps.push(&[step(at, 1.0), step(at + 2, 0.5)], |k| k);
+        }
+        let groups = steps.grouped().expect("few are different");
+        assert_eq!(groups.features.samples(), 7);
+        for point in 0..3 {
+            let spread = |features: &Features, at: &dyn Fn(usize) -> usize| {
+                let (of, mut columns) = (features.values(point), vec![vec![0.0; features.samples]; 2]);
+                let mut from = 0;
+                for (first, count) in of.runs {
+                    for (column, own) in columns.iter_mut().zip(&of.columns) {
+                        column[*first..first + count].copy_from_slice(&own[from..from + count]);
+                    }
+                    from += count;
+                }
+                columns.iter().map(|c| (0..SAMPLES).map(|k| c[at(k)]).collect()).collect::<Vec<Vec<f32>>>()
+            };
+            assert_eq!(spread(&steps, &|k| k), spread(&groups.features, &|k| groups.group[k]));
+        }
+        let mut smooth = nothing();
+        let wave = |by: f64| (0..SAMPLES).map(|k| (by * k as f64).sin()).collect();
+        smooth.push(&[wave(0.1), wave(0.2)], |k| k);
+        assert!(smooth.grouped().is_none());
+    }
 }

@@ -1,10 +1,13 @@
 //! The calibrated machine as a linear model around its optimum: residuals, and how each reading answers to a small twist of every
 //! frame, before and behind its joint. What a diagnosis works on.
 
-use std::sync::OnceLock;
+use std::collections::HashMap;
+use std::sync::{Mutex, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
+use super::equations::Column;
 use crate::error::Result;
 use crate::feature::{Follow, FollowOptions, Samples, first_directions, gravity_of};
 use crate::identify::{
@@ -67,6 +70,8 @@ pub(super) struct Linear {
     pub samples: Vec<Samples>,
     /// The same as if every joint had turned round just before, once it has been asked for.
     turned: OnceLock<Vec<Samples>>,
+    /// Curves of what was there before each joint first turned round, by whether it lasts, and of its sides, once they have been asked for.
+    pub(super) pasts: Mutex<PastCurves>,
     /// Every so manieth sample of the recordings was taken, of so many.
     pub every: u64,
     pub all_samples: u64,
@@ -75,6 +80,9 @@ pub(super) struct Linear {
     /// Where the machine is linearised.
     unknowns: Unknowns,
 }
+
+/// Two sets of curves by joint and by whether its past lasts.
+pub(super) type PastCurves = HashMap<(usize, bool), [Vec<Column>; 2]>;
 
 /// Where a machine is to be linearised anew.
 pub(super) struct Displaced {
@@ -94,6 +102,8 @@ const GENEROUS: f64 = 3.0;
 const FREE: f64 = 10.0;
 /// About so many readings show the step that they are rounded to.
 const ENOUGH: usize = 4096;
+/// Samples that a core takes at a time.
+const SIDE_BY_SIDE: usize = 128;
 
 /// Calibrates with constant deviations and takes the rows there; `dead_bands` by dyad, m or rad.
 pub(super) fn linear(
@@ -233,6 +243,7 @@ fn rows(
         constant: DMatrix::zeros(count, columns.count()),
         samples: Vec::new(),
         turned: OnceLock::new(),
+        pasts: Mutex::default(),
         every,
         all_samples: sources.samples(),
         tolerated: vec![(None, 0.0); columns.count()],
@@ -248,9 +259,8 @@ fn rows(
     }
     for source in &sources.all {
         let evaluator = Evaluator::new(machine, &unknowns, source);
-        let mut work = evaluator.workspace();
         let (readings, values) = (source.sensor.reading_count(), source.recording.value_count());
-        let mut buffer = vec![0.0; readings * evaluator.width()];
+        let commands = machine.commands().len();
         let first = linear.residual.len();
         let first_sample = linear.lines.len();
         let mut number = 0u64;
@@ -273,24 +283,29 @@ fn rows(
         let mut seen: Vec<Vec<f64>> = vec![Vec::new(); values];
         for item in Follow::new(machine, source.recording.chunks()?, &options) {
             let (chunk, samples) = item?;
-            let mut kept = Vec::new();
             for (i, seen) in seen.iter_mut().enumerate().filter(|(_, seen)| seen.len() < ENOUGH) {
                 seen.extend(chunk.values.iter().skip(i).step_by(values));
             }
-            for k in 0..chunk.len {
-                number += 1;
-                if !(number - 1).is_multiple_of(every) {
-                    continue;
-                }
-                kept.push(k);
-                let commands = machine.commands().len();
-                let q = &chunk.commands[k * commands..(k + 1) * commands];
-                let measured = &chunk.values[k * values..(k + 1) * values];
-                let moment = displaced
-                    .as_ref()
-                    .map_or(Moment::Still, |stretch| Moment::At(stretch, linear.lines.len() - first_sample));
-                let residuals = evaluator.residuals(q, measured, moment, &mut work, Some(&mut buffer));
-                let carried = evaluator.carried_rows(measured, &work);
+            let kept: Vec<usize> =
+                (0..chunk.len).filter(|k| (number + *k as u64).is_multiple_of(every)).collect();
+            number += chunk.len as u64;
+            let begins = linear.lines.len() - first_sample;
+            let numbered: Vec<(usize, usize)> = kept.iter().copied().zip(begins..).collect();
+            let some = |some: &[(usize, usize)]| {
+                let mut work = evaluator.workspace();
+                let one = |(k, number): &(usize, usize)| {
+                    let mut rows = vec![0.0; readings * evaluator.width()];
+                    let q = &chunk.commands[k * commands..(k + 1) * commands];
+                    let measured = &chunk.values[k * values..(k + 1) * values];
+                    let moment =
+                        displaced.as_ref().map_or(Moment::Still, |stretch| Moment::At(stretch, *number));
+                    let residuals = evaluator.residuals(q, measured, moment, &mut work, Some(&mut rows));
+                    (residuals, rows, evaluator.carried_rows(measured, &work))
+                };
+                some.iter().map(one).collect::<Vec<_>>()
+            };
+            let computed: Vec<_> = numbered.par_chunks(SIDE_BY_SIDE).map(some).collect();
+            for (k, (residuals, buffer, carried)) in kept.iter().zip(computed.into_iter().flatten()) {
                 for i in 0..readings {
                     let at = linear.residual.len();
                     let row = &buffer[i * evaluator.width()..(i + 1) * evaluator.width()];
@@ -330,7 +345,7 @@ fn rows(
                         put(Role::ToolRotation(r), 5, 3);
                     }
                 }
-                linear.lines.push(chunk.lines[k]);
+                linear.lines.push(chunk.lines[*k]);
             }
             let samples = if kept.len() == samples.len { samples } else { samples.chosen(&kept) };
             match &mut all {

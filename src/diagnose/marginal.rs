@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn, MatrixView, SVD};
+use rayon::prelude::*;
 
 use super::panel::{Panel, WIDTH, add_along, take_away};
 
@@ -14,6 +15,8 @@ pub(super) struct Marginal {
     panels: Vec<Arc<Panel>>,
 }
 
+/// Rows that are turned at once.
+const AT_ONCE: usize = 1024;
 /// Readings that tell no more of a parameter than this part of what was known beforehand tell nothing.
 const UNTOLD: f64 = 1e-9;
 
@@ -37,11 +40,11 @@ impl Marginal {
             let s = svd.singular_values[*j];
             column.scale_mut((s * s / (1.0 + s * s)).sqrt());
         }
-        Marginal::default().and(&(turn.transpose() * q.transpose()))
+        Marginal::default().and(&[turn.transpose() * q.transpose()])
     }
 
-    /// With more columns of `W`, given row by row.
-    fn and(&self, transposed: &DMatrix<f64>) -> Self {
+    /// With more columns of `W`, given row by row, some rows after the other.
+    fn and(&self, transposed: &[DMatrix<f64>]) -> Self {
         let added = Panel::of_transposed(transposed).into_iter().map(Arc::new);
         Marginal { panels: self.panels.iter().cloned().chain(added).collect() }
     }
@@ -67,10 +70,12 @@ impl Marginal {
         let count = columns.ncols();
         let mut back = DMatrix::identity(count, count);
         factor.l_dirty().solve_lower_triangular_mut(&mut back);
-        self.and(&match turned(beside.as_slice(), beside.shape()) {
-            Some(turned) => back * turned,
-            None => back * beside.transpose(),
-        })
+        let Some(turned) = turned(beside.as_slice(), beside.shape()) else {
+            return self.and(&[back * beside.transpose()]);
+        };
+        let starts: Vec<usize> = (0..beside.nrows()).step_by(AT_ONCE).collect();
+        let some = |from: &usize| &back * turned.columns(*from, AT_ONCE.min(beside.nrows() - from));
+        self.and(&starts.par_iter().map(some).collect::<Vec<_>>())
     }
 
     /// Logarithm of the evidence of further columns, each times its prior standard deviation, with what is left of `y` beside the marginal.
@@ -148,28 +153,53 @@ pub(super) fn gram(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     turned_times(a.as_slice(), a.shape(), &b.as_view())
 }
 
-/// Columns of `aᵀ a` that are computed at a time, from the diagonal on: half of a symmetric product tells all of it.
-const STRIP: usize = 16;
+/// Symmetric products of no more columns than this are computed whole, of more in halves: half of one tells all of it.
+const WHOLE: usize = 32;
+/// Products of columns with more numbers than this are shared between cores.
+const WORTH_SHARING: usize = 1 << 16;
 
 /// `aᵀ a` of tall matrices.
 pub(super) fn square(a: &DMatrix<f64>) -> DMatrix<f64> {
     symmetric(a, a)
 }
 
+/// The same of columns that lie one behind the other.
+pub(super) fn square_of(columns: &[f64], (rows, count): (usize, usize)) -> DMatrix<f64> {
+    symmetric_of((columns, columns), rows, (0, count))
+}
+
 /// `aᵀ b` of tall matrices where that is symmetric.
 fn symmetric(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let (rows, count) = a.shape();
-    if count <= WIDE || rows <= WIDE {
-        return a.tr_mul(b);
+    symmetric_of((a.as_slice(), b.as_slice()), a.nrows(), (0, a.ncols()))
+}
+
+/// `aᵀ b` of so many columns from `from` on, where that is symmetric.
+fn symmetric_of((a, b): (&[f64], &[f64]), rows: usize, (from, count): (usize, usize)) -> DMatrix<f64> {
+    let times = |of_a: usize, own: usize, of_b: usize, count: usize| {
+        let other = DMatrixView::from_slice(&b[of_b * rows..(of_b + count) * rows], rows, count);
+        turned_times(&a[of_a * rows..(of_a + own) * rows], (rows, own), &other)
+    };
+    if count <= WHOLE {
+        return times(from, count, from, count);
     }
-    let mut product = DMatrix::zeros(count, count);
-    for from in (0..count).step_by(STRIP) {
-        let (strip, rest) = (STRIP.min(count - from), count - from);
-        let own = turned_times(&a.as_slice()[from * rows..], (rows, rest), &b.columns(from, strip));
-        product.view_mut((from, from), (rest, strip)).copy_from(&own);
-        product.view_mut((from, from), (strip, rest)).tr_copy_from(&own);
-    }
-    product
+    // Blocks of eight rows and columns are multiplied at once.
+    let first = (count / 2).next_multiple_of(8);
+    let (middle, second) = (from + first, count - first);
+    let halves = || {
+        let half = |from: usize, count: usize| symmetric_of((a, b), rows, (from, count));
+        (half(from, first), half(middle, second))
+    };
+    let rest = || times(middle, second, from, first);
+    let ((upper, lower), across) = match rows * count > WORTH_SHARING {
+        true => rayon::join(halves, rest),
+        false => (halves(), rest()),
+    };
+    let mut whole = DMatrix::zeros(count, count);
+    whole.view_mut((0, 0), (first, first)).copy_from(&upper);
+    whole.view_mut((first, first), (second, second)).copy_from(&lower);
+    whole.view_mut((first, 0), (second, first)).copy_from(&across);
+    whole.view_mut((0, first), (first, second)).tr_copy_from(&across);
+    whole
 }
 
 /// `aᵀ b`, of `a` the columns as they lie one behind the other: by blocks that stay in a core's cache; nalgebra's `tr_mul` goes column by column.

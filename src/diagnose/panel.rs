@@ -26,18 +26,21 @@ impl Panel {
         Panel { rows, reduced: Default::default() }
     }
 
-    /// The columns of a matrix that is given row by row: `transposed` has a column per row.
-    pub fn of_transposed(transposed: &DMatrix<f64>) -> Vec<Panel> {
+    /// The columns of a matrix that is given row by row, some rows after the other: `transposed` have a column per row.
+    pub fn of_transposed(transposed: &[DMatrix<f64>]) -> Vec<Panel> {
+        let columns = transposed.first().map_or(0, DMatrix::nrows);
         let panel = |from: usize| {
-            let count = WIDTH.min(transposed.nrows() - from);
+            let count = WIDTH.min(columns - from);
             let row = |column: &[f64]| {
                 let mut row = [0.0; WIDTH];
                 row[..count].copy_from_slice(&column[from..from + count]);
                 row
             };
-            Panel::new(transposed.as_slice().chunks_exact(transposed.nrows()).map(row).collect())
+            let mut rows = Vec::with_capacity(transposed.iter().map(DMatrix::ncols).sum());
+            transposed.iter().for_each(|some| rows.extend(some.as_slice().chunks_exact(columns).map(row)));
+            Panel::new(rows)
         };
-        (0..transposed.nrows()).step_by(WIDTH).map(panel).collect()
+        (0..columns).step_by(WIDTH).map(panel).collect()
     }
 
     pub fn rows(&self) -> &[[f64; WIDTH]] {
@@ -224,7 +227,7 @@ mod tests {
             let at = |i: usize, j: usize| (0.37 * (i as f64 + 1.0) * (j as f64 + 2.0)).sin();
             let (w, c) =
                 (DMatrix::from_fn(1200, width, at), DMatrix::from_fn(1200, columns, |i, j| at(j + 3, i)));
-            let panels: Vec<_> = Panel::of_transposed(&w.transpose()).into_iter().map(Arc::new).collect();
+            let panels: Vec<_> = Panel::of_transposed(&[w.transpose()]).into_iter().map(Arc::new).collect();
             let mut along = DMatrix::zeros(panels.len() * WIDTH, columns);
             add_along(&panels, 0, &c.as_view(), &mut along);
             let plain = w.tr_mul(&c);

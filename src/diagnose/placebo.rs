@@ -69,7 +69,7 @@ pub(super) fn placebo(
         rows.whiten(&mut white);
         let usual = rows.usual_sizes(own, std::slice::from_ref(&effect.score.parameters));
         let (at, mut score) = (&effect.score.parameters, None);
-        judge(&white.as_view(), &field.marginal, &field.left, &[0], &mut |_, equations| {
+        judge((&white, white.ncols()), &field.marginal, &field.left, &[0], &mut |_, equations| {
             score = Some(best(own, at, &lengths(own), equations, search.overdispersion, usual).at(at));
         });
         Some(of("the weights of other poses".into(), own, &score?, &raw))

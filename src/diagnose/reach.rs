@@ -7,10 +7,11 @@ use super::beside::Beside;
 use super::discrepancy;
 use super::equations::Equations;
 use super::evidence::log_mean_exp;
+use super::past::Past;
 use super::policy::Rule;
 use super::score::Field;
 use super::search::{LARGE, MANY, Search};
-use super::terms::Hypothesis;
+use super::terms::{Hypothesis, ModelTerm};
 use crate::effects::Candidate;
 use crate::feature::Feature;
 
@@ -77,9 +78,7 @@ impl Search<'_> {
         let parameters = &hypothesis.score.parameters;
         let white = self.rows.of(candidate, parameters)?;
         let effect = self.enter_as(candidate, hypothesis, &white, (&field.marginal, &field.left))?;
-        let answers = discrepancy::answers(self.rows, candidate, &effect);
-        let initial = discrepancy::initial_conditions(self.rows, candidate, &effect, answers).white;
-        let both = Beside::new(&[&initial, &white], &field.marginal, &field.left).seen(1);
+        let both = self.with_unknown(candidate, &effect, &white, field, false).seen(1);
         if both.count() == 0 {
             return None;
         }
@@ -89,6 +88,39 @@ impl Search<'_> {
             evidence: worth + score.at_best - hypothesis.score.at_best,
             reach: score.gain + (worth * self.overdispersion).max(0.0),
         })
+    }
+
+    /// Columns of what an effect was before anybody looked, of its shape where that is asked for, and its own, beside a field.
+    fn with_unknown(
+        &self,
+        candidate: &Candidate,
+        effect: &ModelTerm,
+        white: &DMatrix<f64>,
+        field: &Field,
+        with_shape: bool,
+    ) -> Beside {
+        let (rows, marginal, left) = (self.rows, &field.marginal, &field.left);
+        let answers = discrepancy::answers(rows, candidate, effect);
+        if let Some((past, features)) = Past::of(rows, candidate, effect, field).filter(|_| self.in_motion) {
+            // Features of one history have its columns each.
+            let size = discrepancy::amplitude(effect);
+            let scales = [size * (features as f64).sqrt(), discrepancy::PART * size];
+            let initial = discrepancy::own_initial_conditions(rows, candidate, effect, answers.clone()).white;
+            if !with_shape {
+                return Beside::with_past(rows, (&past, &scales[..1]), &[&initial, white], marginal, left);
+            }
+            let shape = discrepancy::own_shape(rows, candidate, effect, answers).white;
+            return Beside::with_past(rows, (&past, &scales), &[&initial, &shape, white], marginal, left);
+        }
+        let initial = match self.in_motion {
+            true => discrepancy::initial_conditions(rows, candidate, effect, answers.clone()).white,
+            false => DMatrix::zeros(white.nrows(), 0),
+        };
+        if !with_shape {
+            return Beside::new(&[&initial, white], marginal, left);
+        }
+        let shape = discrepancy::shape(rows, candidate, effect, answers).white;
+        Beside::new(&[&initial, &shape, white], marginal, left)
     }
 
     /// The weight of a hypothesis of which as likely as not the shape departs from the family's, (66).
@@ -103,13 +135,7 @@ impl Search<'_> {
         let parameters = &hypothesis.score.parameters;
         let white = self.rows.of(candidate, parameters)?;
         let effect = self.enter_directed(hypothesis, &white, (&field.marginal, &field.left))?;
-        let answers = discrepancy::answers(self.rows, candidate, &effect);
-        let initial = match self.in_motion {
-            true => discrepancy::initial_conditions(self.rows, candidate, &effect, answers.clone()).white,
-            false => DMatrix::zeros(white.nrows(), 0),
-        };
-        let shape = discrepancy::shape(self.rows, candidate, &effect, answers).white;
-        let all = Beside::new(&[&initial, &shape, &white], &field.marginal, &field.left).seen(2);
+        let all = self.with_unknown(candidate, &effect, &white, field, true).seen(2);
         let with_initial = all.others();
         let grown = |own: &Equations| {
             let score = self.rows.score_by(candidate, parameters, own, self.overdispersion);

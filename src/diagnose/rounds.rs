@@ -1,5 +1,6 @@
 //! One search from the constant geometry to what is said: rounds of judging the noise, of linearising the machine anew, of names.
 
+use std::borrow::Cow;
 use std::sync::Mutex;
 
 use nalgebra::DMatrix;
@@ -73,7 +74,7 @@ impl Case<'_> {
         progress("fitting constant geometry");
         let in_motion = facts.are_smooth();
         let mut linear = linear(machine, recordings, self.options, &facts.dead_bands, in_motion, progress)?;
-        let mut candidates = plain.to_vec();
+        let mut candidates = Cow::Borrowed(plain);
         let runs = noise::runs(&linear);
         let mut coarse = Coarse::new(&linear, &candidates);
         let drives_of = |linear: &Linear, coarse: &Coarse| match in_motion {
@@ -161,7 +162,7 @@ impl Case<'_> {
                 {
                     let gone: Vec<usize> = origin.found.into_iter().filter(is_gone).collect();
                     let mut rest = 0..candidates.len();
-                    candidates.retain(|_| rest.next().is_some_and(|c| !gone.contains(&c)));
+                    candidates.to_mut().retain(|_| rest.next().is_some_and(|c| !gone.contains(&c)));
                     (linear, noise, in_model, moves) = (origin.linear, origin.noise, Vec::new(), 0);
                     coarse = Coarse::new(&linear, &candidates);
                     give_way = drives_of(&linear, &coarse);
@@ -191,7 +192,7 @@ impl Case<'_> {
                 if moves < MOVES
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
-                    (candidates, moves, origin) = (lagged, moves + 1, None);
+                    (candidates, moves, origin) = (Cow::Owned(lagged), moves + 1, None);
                     coarse = Coarse::new(&linear, &candidates);
                     continue;
                 }

@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex, OnceLock};
 use nalgebra::{DMatrix, DVector};
 
 use super::cells::CellSums;
-use super::coarse::Coarse;
+use super::coarse::{Coarse, OnLevel};
 use super::equations::{
     BATCH, Best, Column, Equations, Key, ROOM, Score, best, judge, key, lengths, unit_size,
 };
 use super::evidence::{log_mean_exp, rarity, sizes_up_to};
-use super::features::Features;
 use super::linear::Linear;
 use super::marginal::Marginal;
+use super::past::Pasts;
 use super::whitener::Whitener;
 use crate::effects::Candidate;
 use crate::lie::Twist;
@@ -31,8 +31,7 @@ pub(super) struct Rows<'a> {
     pub(super) coarse: &'a Coarse,
     columns: Mutex<HashMap<Key, Column>>,
     pub(super) coarse_columns: Mutex<HashMap<(usize, Key), Column>>,
-    /// Phases of waves by candidate, and energies of a candidate's pairs of features times an answer.
-    pub(super) waves: Mutex<HashMap<usize, Option<Arc<Vec<Wave>>>>>,
+    /// Energies of a candidate's pairs of features times an answer.
     pub(super) energies: Mutex<HashMap<(usize, usize, Key), Column>>,
     /// Whitened answers, and products of two of them summed over cells.
     white: Mutex<HashMap<Key, Column>>,
@@ -48,14 +47,10 @@ pub(super) struct Field {
     pub(super) coarse: Vec<OnceLock<(Marginal, DVector<f64>)>>,
     /// Sums of answers over cells, once they have been asked for.
     pub(super) cells: Mutex<HashMap<(usize, Key), Arc<CellSums>>>,
-}
-
-/// Phase of a pair of features over the grid.
-pub(super) struct Wave {
-    /// Phase at every sample, over the largest.
-    pub(super) x: Vec<f64>,
-    /// The largest phase, at every point of the grid.
-    pub(super) factors: Vec<f64>,
+    /// The residuals, whitened once more by the transposed, once they have been asked for.
+    pub(super) dual: OnceLock<Vec<f64>>,
+    /// What all effects of a history at a joint have, by their directions.
+    pub(super) pasts: Mutex<Pasts>,
 }
 
 /// Columns behind others of the same rows.
@@ -78,7 +73,6 @@ impl<'a> Rows<'a> {
             coarse,
             columns: Mutex::default(),
             coarse_columns: Mutex::default(),
-            waves: Mutex::default(),
             energies: Mutex::default(),
             white: Mutex::default(),
             cell_energies: Mutex::default(),
@@ -90,7 +84,14 @@ impl<'a> Rows<'a> {
         let marginal = marginal.into();
         let left = marginal.apply(&self.residual);
         let coarse = self.coarse.levels().iter().map(|_| OnceLock::new()).collect();
-        Field { marginal, left, coarse, cells: Mutex::default() }
+        Field {
+            marginal,
+            left,
+            coarse,
+            cells: Mutex::default(),
+            dual: OnceLock::new(),
+            pasts: Mutex::default(),
+        }
     }
 
     /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way.
@@ -355,14 +356,22 @@ impl<'a> Rows<'a> {
         candidate: &Candidate,
         grid: &[Vec<f64>],
         field: &Field,
-        kept: Option<&(usize, Features)>,
+        kept: Option<&OnLevel>,
         overdispersion: f64,
         points: &[usize],
         table: &mut [Option<Best>],
     ) {
         let (k, lengths) = (candidate.coefficients.len(), lengths(candidate));
-        if let Some((level, kept)) = kept {
-            return self.coarse_table(candidate, grid, field, (*level, kept), overdispersion, points, table);
+        if let Some(kept) = kept {
+            return match &kept.groups {
+                Some(groups) => {
+                    self.group_table(candidate, field, (kept.level, groups), overdispersion, points, table)
+                }
+                None => {
+                    let on = (kept.level, &kept.features);
+                    self.coarse_table(candidate, grid, field, on, overdispersion, points, table)
+                }
+            };
         }
         let (marginal, left) = (&*field.marginal, &field.left);
         let usual = self.usual_sizes(candidate, grid);
@@ -377,7 +386,7 @@ impl<'a> Rows<'a> {
                 }
             }
             self.whiten(&mut joined);
-            judge(&joined.columns(0, k * built.len()), marginal, left, &built, &mut |i, equations| {
+            judge((&joined, k), marginal, left, &built, &mut |i, equations| {
                 table[i] = Some(best(candidate, &grid[i], &lengths, equations, overdispersion, usual));
             });
         }

@@ -56,7 +56,9 @@ pub(super) fn powers(x: &[f64], weights: [&[f64]; 2], kappas: &[f64]) -> Option<
 /// the transform the nearest is taken, of which there are eight to the width of a line. Two real columns make one complex one.
 struct Band {
     middle: f64,
+    /// All frequencies of the grid alone, then those next to them, so many times.
     both: Vec<Complex<f64>>,
+    shifts: usize,
     /// Between neighbouring frequencies of the transform, rad per unit of `x`.
     step: f64,
     /// Width of a cell of the grid.
@@ -67,16 +69,26 @@ struct Band {
 const WIDEST: f64 = 8192.0;
 /// Frequencies to the width of a line.
 const PADDED: usize = 8;
+/// Grids of fewer cells are transformed with their zeros.
+const SHORT: f64 = 12.0;
+
+/// A transform, and by what the grid is turned for frequencies next to its own.
+struct Transform {
+    radix: Radix4<f64>,
+    turns: Vec<Complex<f64>>,
+}
 
 /// The transforms so far, by length, for all threads: each is as large as what it transforms.
-static TRANSFORMS: Mutex<BTreeMap<usize, Arc<Radix4<f64>>>> = Mutex::new(BTreeMap::new());
+static TRANSFORMS: Mutex<BTreeMap<usize, Arc<Transform>>> = Mutex::new(BTreeMap::new());
 
 impl Band {
     fn new(x: &[f64], (from, extent): (f64, f64), weights: [&[f64]; 2], middle: f64, half: f64) -> Self {
         let cells = (4.0 * extent * half / TAU).ceil() + 2.0;
         let cell = extent / (cells - 2.0);
-        let length = fast(PADDED * cells as usize);
-        let mut both = vec![Complex::new(0.0, 0.0); length];
+        // The grid is followed by zeros; a long one is transformed alone, shift by shift.
+        let (shifts, padded) = if cells < SHORT { (1, PADDED) } else { (PADDED, 1) };
+        let length = fast(padded * cells as usize);
+        let mut grid = vec![Complex::new(0.0, 0.0); length];
         let [first, second] = weights;
         let shift = (middle != 0.0).then(|| {
             let angles: Vec<f64> = x.iter().map(|x| -middle * (x - from)).collect();
@@ -89,15 +101,15 @@ impl Band {
             if let Some((sines, cosines)) = &shift {
                 weight *= Complex::new(cosines[k], sines[k]);
             }
-            both[index] += weight * (1.0 - part);
-            both[index + 1] += weight * part;
+            grid[index] += weight * (1.0 - part);
+            grid[index + 1] += weight * part;
         }
         let transform = {
             let mut known = TRANSFORMS.lock().unwrap_or_else(PoisonError::into_inner);
-            known.entry(length).or_insert_with(|| Arc::new(transform(length))).clone()
+            known.entry(length).or_insert_with(|| Arc::new(Transform::new(length))).clone()
         };
-        transform.process(&mut both);
-        Band { middle, step: TAU / (length as f64 * cell), both, cell }
+        let both = transform.shifted(grid, shifts);
+        Band { middle, step: TAU / (both.len() as f64 * cell), both, shifts, cell }
     }
 
     fn at(&self, kappa: f64) -> Complex<f64> {
@@ -107,7 +119,32 @@ impl Band {
         // Sharing a weight out between two cells dampens short periods, by the square of sin(h)/h, h up to 45°.
         let h = (0.5 * off * self.cell).powi(2);
         let sinc = 1.0 - h / 6.0 * (1.0 - h / 20.0 * (1.0 - h / 42.0));
-        self.both[index] / (sinc * sinc)
+        self.both[index % self.shifts * (self.both.len() / self.shifts) + index / self.shifts] / (sinc * sinc)
+    }
+}
+
+impl Transform {
+    fn new(length: usize) -> Self {
+        let angles: Vec<f64> = (0..length).map(|n| -TAU * n as f64 / (PADDED * length) as f64).collect();
+        let (sines, cosines) = sines_cosines(&angles);
+        let turns = cosines.into_iter().zip(sines).map(|(cosine, sine)| Complex::new(cosine, sine)).collect();
+        Transform { radix: transform(length), turns }
+    }
+
+    /// The transform of a grid that is followed by zeros, so many times as long with them: first every so manieth frequency, then those next to these,
+    /// and so on. Each of them is a transform of the grid alone, which stays in a core's cache.
+    fn shifted(&self, mut grid: Vec<Complex<f64>>, shifts: usize) -> Vec<Complex<f64>> {
+        let mut scratch = vec![Complex::new(0.0, 0.0); self.radix.get_inplace_scratch_len()];
+        let mut all = Vec::with_capacity(shifts * grid.len());
+        for shift in 0..shifts {
+            if shift > 0 {
+                grid.iter_mut().zip(&self.turns).for_each(|(x, turn)| *x *= turn);
+            }
+            let from = all.len();
+            all.extend_from_slice(&grid);
+            self.radix.process_with_scratch(&mut all[from..], &mut scratch);
+        }
+        all
     }
 }
 

@@ -125,7 +125,7 @@ impl Sum {
             Series::of(first.joint, second.joint, motions(first, self.translates), vec![sines, cosines]);
         let columns = series.columns(rows);
         let (mut standing, count) = (None, columns.ncols());
-        judge(&columns.columns(0, count), &field.marginal, &field.left, &[0], &mut |_, equations| {
+        judge((&columns, count), &field.marginal, &field.left, &[0], &mut |_, equations| {
             let Worth { evidence, gain, .. } =
                 evidence(&equations.gram, &equations.toward, count, overdispersion, 0);
             standing = Some(series.standing(evidence, gain));

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use super::coarse::Wave;
 use super::equations::{Column, Key, key};
 use super::passing::{Passed, add_energies};
-use super::score::{Field, Rows, Wave};
+use super::score::{Field, Rows};
 use super::spectrum;
 use crate::effects::{Candidate, Coefficient};
 use crate::feature::Feature;
@@ -26,7 +27,7 @@ impl Rows<'_> {
     /// the marginal; `None` if the features are no such pairs, or a phase is no multiple of one column.
     pub(super) fn harmonics(&self, i: usize, candidate: &Candidate, field: &Field) -> Option<Vec<f64>> {
         let waves = self.waves(i, candidate)?;
-        let dual = self.whitener.transposed(field.left.as_slice());
+        let dual = field.dual.get_or_init(|| self.whitener.transposed(field.left.as_slice()));
         let mut sums: Vec<Sums> = Vec::new();
         for (pair, wave) in waves.iter().enumerate() {
             let own: Vec<&Coefficient> =
@@ -38,7 +39,7 @@ impl Rows<'_> {
                     two.iter().enumerate().flat_map(|(c, one)| one.parts.iter().map(move |p| (c, p)))
                 {
                     let answer = self.answer(part.slot, part.direction);
-                    answer.iter().zip(&dual).enumerate().for_each(|(row, (a, d))| {
+                    answer.iter().zip(dual).enumerate().for_each(|(row, (a, d))| {
                         weights[c][self.linear.sample[row]] += a * d;
                     });
                     let more = self.energies((i, pair, key(part.slot, part.direction)), &answer, wave);
@@ -72,18 +73,14 @@ impl Rows<'_> {
     }
 
     /// Phases of candidate `i`, pair by pair.
-    fn waves(&self, i: usize, candidate: &Candidate) -> Option<Arc<Vec<Wave>>> {
-        if let Some(known) = self.waves.lock().ok().and_then(|map| map.get(&i).cloned()) {
-            return known;
-        }
-        let is_paired = candidate.features.len().is_multiple_of(2) && !candidate.features.is_empty();
-        let pairs = candidate.features.chunks_exact(2).filter(|_| is_paired);
-        let waves = pairs.map(|features| self.wave(candidate, features)).collect::<Option<Vec<_>>>();
-        let waves = waves.filter(|all| !all.is_empty()).map(Arc::new);
-        if let Ok(mut map) = self.waves.lock() {
-            map.insert(i, waves.clone());
-        }
-        waves
+    fn waves(&self, i: usize, candidate: &Candidate) -> Option<&[Wave]> {
+        let first = || {
+            let is_paired = candidate.features.len().is_multiple_of(2) && !candidate.features.is_empty();
+            let pairs = candidate.features.chunks_exact(2).filter(|_| is_paired);
+            let waves = pairs.map(|features| self.wave(candidate, features)).collect::<Option<Vec<_>>>();
+            waves.filter(|all| !all.is_empty())
+        };
+        self.coarse.waves[i].get_or_init(first).as_deref()
     }
 
     /// Phase of one pair of features.

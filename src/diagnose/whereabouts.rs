@@ -52,7 +52,7 @@ pub(super) fn standing(search: &Search, machine: &Machine, marginal: Marginal) -
         let columns = level.map_or_else(|| series.columns(rows), |level| series.on_blocks(rows, level));
         let mut standing = None;
         let count = columns.ncols();
-        judge(&columns.columns(0, count), marginal, left, &[0], &mut |_, equations| {
+        judge((&columns, count), marginal, left, &[0], &mut |_, equations| {
             let Worth { evidence, gain, .. } =
                 evidence(&equations.gram, &equations.toward, count, overdispersion, 0);
             standing = Some(series.standing(evidence, gain));
