@@ -128,7 +128,7 @@ pub(super) fn past_curves(linear: &Linear, of: (usize, bool)) -> Option<[Vec<Col
 fn turns(rows: &Rows, candidate: &Candidate, parameters: &[f64]) -> Vec<Column> {
     let (stretches, mut curves) = (&rows.linear.samples, Vec::new());
     // Machines that stand before a recording may have turned round just there.
-    for feature in candidate.features.iter().filter(|f| f.sees_reversals()) {
+    for feature in candidate.features.iter().filter(|f| f.needs_history()) {
         let with = feature.over(rows.linear.turned_before(), parameters);
         let without = feature.over(stretches, parameters);
         let change: Vec<f64> = with.iter().zip(&without).map(|(a, b)| a - b).collect();

@@ -210,11 +210,6 @@ impl Feature {
         any(&self.node, &history)
     }
 
-    /// Whether it depends on how far a joint has come since it last turned round, as the samples tell it.
-    pub(crate) fn sees_reversals(&self) -> bool {
-        any(&self.node, &|n| matches!(n, Node::Joint(_, Column::SinceReversal)))
-    }
-
     /// The extra channels that it needs, by name and unit.
     pub fn channels(&self) -> Vec<(String, String)> {
         let mut names = Vec::new();

@@ -1,13 +1,13 @@
-//! A joint that stands still all through a recording: nothing but the readings says from which side it came there.
+//! A joint that stands still all through a recording, or before it first moves: nothing but the readings says from which side it came there.
 
 use crate::common;
 use crate::common::random::normals;
-use kincal::CalibratedMachine;
 use kincal::diagnose::{DiagnoseOptions, diagnose};
 use kincal::effects::{Identified, Library, RecordingFacts};
 use kincal::identify::CalibrateOptions;
 use kincal::predict::predict;
 use kincal::recording::Recording;
+use kincal::{CalibratedMachine, Machine};
 
 /// Samples of a recording, ten milliseconds apart.
 const COUNT: usize = 1500;
@@ -54,15 +54,12 @@ fn read(truth: &CalibratedMachine, at: &Recording, seed: u64) -> Vec<[f64; 3]> {
     rows.map(noisy).collect()
 }
 
-#[test]
-fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_the_model() {
-    let machine = common::machine("xyz_mill");
+/// A mill whose x has 20 um of play.
+fn with_play(machine: &Machine, blank: &[Recording]) -> CalibratedMachine {
     let library = Library::standard();
-    let blank =
-        [recording("moves.csv", 0.0, true, None, None), recording("rests.csv", 20.0, false, None, None)];
-    let facts = RecordingFacts::of(&machine, &blank).unwrap_or_else(|e| panic!("{e}"));
-    let all = library.candidates(&machine, &facts).all;
-    let is_play = |c: &&kincal::effects::Candidate| c.effect == "backlash" && c.place.name(&machine) == "x";
+    let facts = RecordingFacts::of(machine, blank).unwrap_or_else(|e| panic!("{e}"));
+    let all = library.candidates(machine, &facts).all;
+    let is_play = |c: &&kincal::effects::Candidate| c.effect == "backlash" && c.place.name(machine) == "x";
     let candidate = all.iter().find(is_play).expect("a candidate");
     let play = Identified {
         family: &library.families()[candidate.family],
@@ -71,14 +68,23 @@ fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_
         parameters: Vec::new(),
         covariance: None,
     };
+    CalibratedMachine::nominal(machine.clone())
+        .with_effects(vec![play.stored(machine, &[])], vec![1e-9; 3])
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_the_model() {
+    let machine = common::machine("xyz_mill");
+    let library = Library::standard();
+    let blank =
+        [recording("moves.csv", 0.0, true, None, None), recording("rests.csv", 20.0, false, None, None)];
     // What follows its direction of travel without a name has its side too.
     let lost = ["backlash", "hysteresis", "direction_dependent_pose"];
     let nameless = lost
         .iter()
         .fold(library.clone(), |library, family| library.without(family).unwrap_or_else(|e| panic!("{e}")));
-    let truth = CalibratedMachine::nominal(machine.clone())
-        .with_effects(vec![play.stored(&machine, &[])], vec![1e-9; 3])
-        .unwrap_or_else(|e| panic!("{e}"));
+    let truth = with_play(&machine, &blank);
     for (side, library) in [(1, &library), (-1, &library), (-1, &nameless)] {
         let moved = read(&truth, &blank[0], 1);
         let rested = read(&truth, &recording("rests.csv", 20.0, false, Some(side), None), 2);
@@ -122,4 +128,43 @@ fn the_side_from_which_a_joint_came_that_stands_still_is_read_off_and_goes_into_
             rms(&known[1])
         );
     }
+}
+
+/// Positions of x, y and z, mm, and the direction in which x travels: it rests at first where it has come rising, and moves down from there.
+fn rests_first() -> Vec<([f64; 3], i8)> {
+    let at = |k: usize| {
+        let [_, y, z] = path(false)[k];
+        let turn = k.saturating_sub(COUNT / 5) as f64 / COUNT as f64 * std::f64::consts::TAU;
+        [40.0 - 60.0 * (1.0 - (2.0 * turn).cos()) - 10.0 * (1.0 - (7.0 * turn).cos()), y, z]
+    };
+    let all: Vec<[f64; 3]> = (0..COUNT).map(at).collect();
+    let direction = |k: usize| if k == 0 || all[k][0] >= all[k - 1][0] { 1 } else { -1 };
+    (0..COUNT).map(|k| (all[k], direction(k))).collect()
+}
+
+#[test]
+fn a_joint_that_rests_first_may_have_come_from_the_other_side_and_the_model_knows() {
+    let machine = common::machine("xyz_mill");
+    let written = |points: Option<&[[f64; 3]]>| {
+        let mut text = String::from("# measurement: position\nt[s],x[mm],y[mm],z[mm],px[m],py[m],pz[m]");
+        text += if points.is_none() { ",x_direction[1]\n" } else { "\n" };
+        for (k, ([x, y, z], side)) in rests_first().into_iter().enumerate() {
+            let [px, py, pz] = points.map_or([0.0; 3], |points| points[k]);
+            text += &format!("{},{x},{y},{z},{px},{py},{pz}", 0.01 * k as f64);
+            text += &if points.is_none() { format!(",{side}\n") } else { "\n".into() };
+        }
+        Recording::from_bytes("rests.csv", text.into_bytes(), &machine).unwrap_or_else(|e| panic!("{e}"))
+    };
+    let blank = written(None);
+    let points = read(&with_play(&machine, std::slice::from_ref(&blank)), &blank, 3);
+    let known = [written(Some(&points))];
+    let mut said = diagnose(&machine, &known, &Library::standard(), &DiagnoseOptions::default(), &|_| {})
+        .unwrap_or_else(|e| panic!("{e}"));
+    let names: Vec<(&str, &str)> = said.findings.iter().map(|f| (f.effect.as_str(), f.at.as_str())).collect();
+    assert_eq!(names, [("backlash", "x")]);
+    // It moves later on.
+    assert!(said.stand_still.is_empty(), "{:?}", said.stand_still);
+    said.model(&machine, &known, CalibrateOptions::default(), &|_| {}).unwrap_or_else(|e| panic!("{e}"));
+    let (noise, last) = (3f64.sqrt() * 1e-6, said.rms.m.expect("lengths").r#final);
+    assert!((0.95 * noise..1.15 * noise).contains(&last), "{last}");
 }
