@@ -25,6 +25,7 @@ mod features;
 mod finding;
 mod folds;
 mod held_out;
+mod history;
 mod lag;
 mod leftover;
 mod linear;

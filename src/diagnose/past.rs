@@ -1,36 +1,17 @@
 //! What all effects of a history at one joint have: columns of how it was before anybody looked, and of their shapes, which hypotheses at that
 //! joint share. Their products are made once for all of them, `docs/diagnosis-method.md` (66).
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, DVectorView};
 
 use super::discrepancy::{self, Unmixed, past_curves, whitened};
-use super::equations::{Column, Key, key};
+use super::equations::{Column, key};
+use super::history::Past;
 use super::marginal::square;
 use super::score::{Field, Rows};
 use super::terms::{ModelTerm, side_by_side};
 use crate::effects::Candidate;
-
-/// Products of the columns of a history beside a field, each column of norm one.
-pub(super) struct Past {
-    answers: Vec<Column>,
-    curves: Vec<Column>,
-    /// Which answer and curve a column is made of, and by what it is multiplied.
-    made_of: Vec<(usize, usize, f64)>,
-    /// So many of the columns are of what was there before anybody looked, the others of the shape.
-    pub before: usize,
-    /// Gram matrix of the columns.
-    pub own: DMatrix<f64>,
-    /// What the marginal takes of them.
-    pub along: DMatrix<f64>,
-    /// The columns times the residuals that it leaves.
-    pub toward: DVector<f64>,
-}
-
-/// By directions, joint, and whether it lasts.
-pub(super) type Pasts = HashMap<(Vec<Key>, usize, bool), Arc<Past>>;
 
 impl Past {
     /// What an effect has of a history that others have too, beside a field, and how many of its features have it; `None` of histories of its own,

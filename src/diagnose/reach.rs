@@ -7,7 +7,7 @@ use super::beside::Beside;
 use super::discrepancy;
 use super::equations::Equations;
 use super::evidence::log_mean_exp;
-use super::past::Past;
+use super::history::Past;
 use super::policy::Rule;
 use super::score::Field;
 use super::search::{LARGE, MANY, Search};
