@@ -41,34 +41,17 @@ pub(super) fn evidence(
     overdispersion: f64,
     usual: usize,
 ) -> Worth {
-    let g = &g.as_slice()[..length];
-    // Most have a coefficient or two.
-    let (mut few, mut many) = ([0.0; 6], Vec::new());
-    let memory = match length {
-        0..=2 => &mut few[..length * length + length],
-        _ => {
-            many.resize(length * length + length, 0.0);
-            &mut many[..]
-        }
-    };
-    let (factor, solved) = memory.split_at_mut(length * length);
+    let (gram, g) = (gram.view((0, 0), (length, length)), g.rows(0, length).into_owned());
     // Logarithm, gain, root mean square of the coefficients over the size.
-    let mut with = |size: f64| {
+    let with = |size: f64| {
         let s2 = size * size / overdispersion;
-        for (j, column) in factor.chunks_exact_mut(length.max(1)).enumerate() {
-            column.iter_mut().zip(gram.column(j).iter()).for_each(|(x, gram)| *x = gram * s2);
-            column[j] += 1.0;
-        }
-        if !factorise(factor, length) {
-            return None;
-        }
-        solved.copy_from_slice(g);
-        solve(factor, solved);
-        solved.iter_mut().for_each(|x| *x *= s2);
-        let gain = 0.5 * g.iter().zip(&*solved).map(|(g, x)| g * x).sum::<f64>();
-        let log_det: f64 = (0..length).map(|j| factor[j * length + j].ln()).sum();
-        let norm = solved.iter().map(|x| x * x).sum::<f64>().sqrt();
-        Some((gain / overdispersion - log_det, gain, norm / (length as f64).sqrt() / size))
+        let mut inner = gram * s2;
+        (0..length).for_each(|i| inner[(i, i)] += 1.0);
+        let cholesky = Cholesky::new(inner)?;
+        let solved = cholesky.solve(&g) * s2;
+        let gain = 0.5 * g.dot(&solved);
+        let log_det: f64 = cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        Some((gain / overdispersion - log_det, gain, solved.norm() / (length as f64).sqrt() / size))
     };
     let mut worth = Worth { evidence: 0.0, gain: 0.0, size: 1.0 };
     let mut held = false;
@@ -97,39 +80,6 @@ pub(super) fn evidence(
         worth.evidence = log_sum_exp(&beyond);
     }
     worth
-}
-
-/// The triangle of Cholesky in place of the lower half of a square, column by column; `false` where that is not positive.
-fn factorise(square: &mut [f64], length: usize) -> bool {
-    for j in 0..length {
-        let (before, own) = square.split_at_mut(j * length);
-        let own = &mut own[j..length];
-        for column in before.chunks_exact(length) {
-            let by = column[j];
-            own.iter_mut().zip(&column[j..]).for_each(|(x, other)| *x -= by * other);
-        }
-        if own[0].is_nan() || own[0] <= 0.0 {
-            return false;
-        }
-        let root = own[0].sqrt();
-        own[0] = root;
-        own[1..].iter_mut().for_each(|x| *x /= root);
-    }
-    true
-}
-
-/// Solves by the triangle and its transposed, in place.
-fn solve(factor: &[f64], x: &mut [f64]) {
-    let length = x.len().max(1);
-    for (j, column) in factor.chunks_exact(length).enumerate() {
-        x[j] /= column[j];
-        let by = x[j];
-        x[j + 1..].iter_mut().zip(&column[j + 1..]).for_each(|(x, l)| *x -= by * l);
-    }
-    for (j, column) in factor.chunks_exact(length).enumerate().rev() {
-        let taken: f64 = x[j + 1..].iter().zip(&column[j + 1..]).map(|(x, l)| x * l).sum();
-        x[j] = (x[j] - taken) / column[j];
-    }
 }
 
 /// Parts of the size that are asked for how large coefficients are, each half of the one before; what is told leaves this much room.
