@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::discrepancy::seen;
 use super::equations::Equations;
-use super::history::Past;
 use super::marginal::{Marginal, square, with_prior, worth_of};
+use super::past::Past;
 use super::score::Rows;
 use super::terms::side_by_side;
 

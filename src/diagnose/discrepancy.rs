@@ -44,25 +44,16 @@ const BEGINNINGS: usize = 64;
 /// Effects with more directions keep the mixture of them that was found.
 pub(super) const MOST_DIRECTIONS: usize = 3;
 
-/// Columns of the shape of an effect, each times what its coefficient may be; `answers`: to its motion.
+/// Columns of the shape of an effect, each times what its coefficient may be; `answers`: to its motion. `with_sides`: with those that every effect
+/// of the same history has, [`past_curves`].
 pub(super) fn shape(
     rows: &Rows,
     candidate: &Candidate,
     in_model: &ModelTerm,
     answers: Vec<Column>,
+    with_sides: bool,
 ) -> Unmixed {
-    let curves = curves(rows, candidate, &in_model.score.parameters, true);
-    whitened(rows, answers, curves.into_iter().map(Arc::new).collect(), PART * amplitude(in_model))
-}
-
-/// The same without those columns that every effect of the same history has, [`past_curves`].
-pub(super) fn own_shape(
-    rows: &Rows,
-    candidate: &Candidate,
-    in_model: &ModelTerm,
-    answers: Vec<Column>,
-) -> Unmixed {
-    let curves = curves(rows, candidate, &in_model.score.parameters, false);
+    let curves = curves(rows, candidate, &in_model.score.parameters, with_sides);
     whitened(rows, answers, curves.into_iter().map(Arc::new).collect(), PART * amplitude(in_model))
 }
 

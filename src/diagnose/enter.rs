@@ -155,7 +155,7 @@ impl Search<'_> {
     fn shape_of(&self, effect: &ModelTerm) -> DMatrix<f64> {
         let candidate = &self.candidates[effect.candidate];
         let answers = discrepancy::answers(self.rows, candidate, effect);
-        discrepancy::shape(self.rows, candidate, effect, answers).mixed().white
+        discrepancy::shape(self.rows, candidate, effect, answers, true).mixed().white
     }
 
     /// Gram matrix of columns beside a marginal, and what leads from them to the residuals.

@@ -7,7 +7,7 @@ use super::beside::Beside;
 use super::discrepancy;
 use super::equations::Equations;
 use super::evidence::log_mean_exp;
-use super::history::Past;
+use super::past::Past;
 use super::policy::Rule;
 use super::score::Field;
 use super::search::{LARGE, MANY, Search};
@@ -109,7 +109,7 @@ impl Search<'_> {
             if !with_shape {
                 return Beside::with_past(rows, (&past, &scales[..1]), &[&initial, white], marginal, left);
             }
-            let shape = discrepancy::own_shape(rows, candidate, effect, answers).white;
+            let shape = discrepancy::shape(rows, candidate, effect, answers, false).white;
             return Beside::with_past(rows, (&past, &scales), &[&initial, &shape, white], marginal, left);
         }
         let initial = match self.in_motion {
@@ -119,7 +119,7 @@ impl Search<'_> {
         if !with_shape {
             return Beside::new(&[&initial, white], marginal, left);
         }
-        let shape = discrepancy::shape(rows, candidate, effect, answers).white;
+        let shape = discrepancy::shape(rows, candidate, effect, answers, true).white;
         Beside::new(&[&initial, &shape, white], marginal, left)
     }
 

@@ -11,9 +11,9 @@ use super::equations::{
     BATCH, Best, Column, Equations, Key, ROOM, Score, best, judge, key, lengths, unit_size,
 };
 use super::evidence::{log_mean_exp, rarity, sizes_up_to};
-use super::history::Pasts;
 use super::linear::Linear;
 use super::marginal::Marginal;
+use super::past::Pasts;
 use super::whitener::Whitener;
 use crate::effects::Candidate;
 use crate::lie::Twist;
