@@ -108,14 +108,9 @@ impl Unnamed {
     }
 
     /// The parts that what was found leaves to be modelled; where there are none, the likeliest one, that can only be told. `search`: with
-    /// these candidates, of which those that `is_asked` tells are.
-    pub fn parts(
-        &self,
-        search: &Search,
-        in_model: &[ModelTerm],
-        is_asked: impl Fn(&usize) -> bool,
-    ) -> (Vec<ModelTerm>, Option<ModelTerm>) {
-        let found = self.parts_beside(search, in_model, &is_asked);
+    /// these candidates.
+    pub fn parts(&self, search: &Search, in_model: &[ModelTerm]) -> (Vec<ModelTerm>, Option<ModelTerm>) {
+        let found = self.parts_beside(search, in_model);
         if search.overdispersion <= 1.0 {
             return found;
         }
@@ -129,18 +124,13 @@ impl Unnamed {
             return found;
         }
         let search = Search { overdispersion, ..self.search(search, search.rows) };
-        let again = self.parts_beside(&search, in_model, &is_asked);
+        let again = self.parts_beside(&search, in_model);
         let with = [in_model, &again.0].concat();
         if again.0.is_empty() || folds::are_better(&search, &all, &with) { found } else { again }
     }
 
     /// The same, where chance is as large as the search has it.
-    fn parts_beside(
-        &self,
-        search: &Search,
-        in_model: &[ModelTerm],
-        is_asked: impl Fn(&usize) -> bool,
-    ) -> (Vec<ModelTerm>, Option<ModelTerm>) {
+    fn parts_beside(&self, search: &Search, in_model: &[ModelTerm]) -> (Vec<ModelTerm>, Option<ModelTerm>) {
         let (mut all, first) = (in_model.to_vec(), in_model.len());
         let mut told = None;
         let is_reading = |c: &usize| {
@@ -148,8 +138,7 @@ impl Unnamed {
             self.candidates[*c].place == Place::Measurement && parts.all(|part| part.slot == Slot::Reading)
         };
         // What a joint or a frame does is no reading's.
-        let (mut rest, mut open): (Vec<usize>, Vec<usize>) =
-            (0..self.candidates.len()).filter(is_asked).partition(is_reading);
+        let (mut rest, mut open): (Vec<usize>, Vec<usize>) = (0..self.candidates.len()).partition(is_reading);
         while all.len() - first < MOST {
             (search.progress)(&format!("modelling what has no name, part {}", all.len() - first + 1));
             let marginal = Arc::new(search.beside_names(&all));

@@ -56,7 +56,7 @@ pub(super) fn report(
     let mut shares = search.shares(in_model);
     let mut doubt = doubt(search, in_model, machine, &shares);
     // Where names do not explain all that is there, they stand if they foretell more than what has no name does.
-    let proved = doubt.as_ref().and_then(|_| proved(search, in_model, (machine, facts), noise));
+    let proved = doubt.as_ref().and_then(|_| proved(search, in_model, machine, noise));
     let is_proved = proved.is_some();
     let in_model = proved.as_deref().unwrap_or(in_model);
     if is_proved {
@@ -216,7 +216,7 @@ impl Findings {
         shared_effects.iter_mut().for_each(|term| *term = beside(term));
         let mut known: Vec<ModelTerm> =
             told.iter().map(|t| &t.term).chain(&shared_effects).cloned().collect();
-        let (modelled, only_told) = unnamed.parts(search, &known, |_| true);
+        let (modelled, only_told) = unnamed.parts(search, &known);
         let naming = unnamed.named(search, &known, modelled.clone());
         let found: Vec<ModelTerm> =
             naming.told.iter().map(|given| &given.term).chain(&naming.parts).cloned().collect();
@@ -366,11 +366,11 @@ impl Modelled {
 }
 
 /// The effects that foretell stretches that were left out, each beside the others, where all of them together leave no more than half of
-/// the squares there; unless parts in their place foretell these better, by more than one standard error, `docs/diagnosis-method.md` (79).
+/// the squares there, `docs/diagnosis-method.md` (79).
 fn proved(
     search: &Search,
     in_model: &[ModelTerm],
-    (machine, facts): (&Machine, &RecordingFacts),
+    machine: &Machine,
     noise: &[Noise],
 ) -> Option<Vec<ModelTerm>> {
     // No other recording has this one's clock.
@@ -385,17 +385,7 @@ fn proved(
     while let Some(i) = worst(&names) {
         names.remove(i);
     }
-    if folds::remaining(search, noise, &names, 0).is_none_or(|part| part > HALF) {
-        return None;
-    }
-    let unnamed = Unnamed::beside(search, machine, facts);
-    let rows = unnamed.rows(search, None);
-    let search = unnamed.search(search, &rows);
-    let (parts, _) = unnamed.parts(&search, &[], |candidate| !search.goes_by_clock(*candidate));
-    // Parts that are these names and more say nothing against them.
-    let is_among = |name: &ModelTerm| parts.iter().any(|part| part.candidate == name.candidate);
-    let stand = names.iter().all(is_among) || !folds::are_better(&search, &parts, &names);
-    (stand || !Rule::PartsOutdoNames.decides()).then_some(names)
+    folds::remaining(search, noise, &names, 0).is_some_and(|part| part <= HALF).then_some(names)
 }
 
 /// What is said of structure without a name; `found`: the marginal beside what has one.

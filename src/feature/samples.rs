@@ -70,12 +70,8 @@ impl Samples {
             let unseen =
                 joint.since_reversal.iter_mut().zip(&joint.travelled).filter(|(since, _)| **since >= FAR);
             unseen.for_each(|(since, travelled)| *since = *travelled);
-            // A joint that moves from the beginning has come that way.
-            if joint.travelled.get(1).is_some_and(|way| *way == 0.0) {
-                let standing =
-                    joint.direction.iter_mut().zip(&joint.travelled).filter(|(_, way)| **way == 0.0);
-                standing.for_each(|(direction, _)| *direction = -*direction);
-            }
+            let standing = joint.direction.iter_mut().zip(&joint.travelled).filter(|(_, way)| **way == 0.0);
+            standing.for_each(|(direction, _)| *direction = -*direction);
         }
         turned
     }
