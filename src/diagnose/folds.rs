@@ -283,7 +283,7 @@ pub(super) fn worst(search: &Search, in_model: &[ModelTerm], names: usize) -> Op
 }
 
 fn is_harm(search: &Search, (gain, error): (f64, f64)) -> bool {
-    if search.in_motion { gain < -error } else { gain < 0.0 }
+    gain < if search.in_motion { -error } else { error }
 }
 
 /// Normal equations of all samples and of each fold.
