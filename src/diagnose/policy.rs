@@ -84,6 +84,8 @@ pub(super) enum Rule {
     OddsMayShift,
 
     // ---- What has no name ----
+    /// Parts that foretell better outdo names that leave much (`report.rs`).
+    PartsOutdoNames,
     /// Beside parts, a name that does harm goes (`report.rs`).
     NoneDoesHarmBesideParts,
     /// Parts that leave more than half are not modelled (`report.rs`).

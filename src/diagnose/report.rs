@@ -56,7 +56,7 @@ pub(super) fn report(
     let mut shares = search.shares(in_model);
     let mut doubt = doubt(search, in_model, machine, &shares);
     // Where names do not explain all that is there, they stand if they foretell more than what has no name does.
-    let proved = doubt.as_ref().and_then(|_| proved(search, in_model, machine, noise));
+    let proved = doubt.as_ref().and_then(|_| proved(search, in_model, (machine, facts), noise));
     let is_proved = proved.is_some();
     let in_model = proved.as_deref().unwrap_or(in_model);
     if is_proved {
@@ -366,11 +366,12 @@ impl Modelled {
 }
 
 /// The effects that foretell stretches that were left out, each beside the others, where all of them together leave no more than half of
-/// the squares there, `docs/diagnosis-method.md` (79).
+/// the squares there; unless parts in their place foretell these better, by more than one standard error, also where parts stand beside the
+/// names, `docs/diagnosis-method.md` (79).
 fn proved(
     search: &Search,
     in_model: &[ModelTerm],
-    machine: &Machine,
+    (machine, facts): (&Machine, &RecordingFacts),
     noise: &[Noise],
 ) -> Option<Vec<ModelTerm>> {
     // No other recording has this one's clock.
@@ -385,7 +386,20 @@ fn proved(
     while let Some(i) = worst(&names) {
         names.remove(i);
     }
-    folds::remaining(search, noise, &names, 0).is_some_and(|part| part <= HALF).then_some(names)
+    if folds::remaining(search, noise, &names, 0).is_none_or(|part| part > HALF) {
+        return None;
+    }
+    let unnamed = Unnamed::beside(search, machine, facts);
+    let rows = unnamed.rows(search, None);
+    let search = unnamed.search(search, &rows);
+    let (parts, _) = unnamed.parts(&search, &[]);
+    let stands = |names: &[ModelTerm]| !folds::are_better(&search, &parts, names);
+    // What they leave is modelled beside them.
+    let with_parts = || {
+        let (beside, _) = unnamed.parts(&search, &names);
+        [names.as_slice(), &beside].concat()
+    };
+    (stands(&names) || stands(&with_parts()) || !Rule::PartsOutdoNames.decides()).then_some(names)
 }
 
 /// What is said of structure without a name; `found`: the marginal beside what has one.
