@@ -258,7 +258,7 @@ fn grams(
 
 /// What foretells stretches that were left out, (68): effects without which these are foretold better go, the worst first, and all of them
 /// where together they do worse than geometry alone. In motion that has to be so by more than a standard error; what is undecided stays.
-/// Settled positions are few, and where none is repeated nothing tells their noise: there every effect has to prove itself.
+/// Settled positions are few, and where none is repeated nothing tells their noise: there every effect has to prove itself, by as much.
 pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> {
     let mut kept = in_model.to_vec();
     while let Some(folds) = Folds::new(search, &kept) {

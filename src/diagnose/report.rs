@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::approaches::{approaches, stand_still};
 use super::contained::says_no_more;
 use super::diagnosis::{Diagnosis, Named, SharedEffect, Thinned};
+use super::discrepancy::is_of_position;
 use super::doubt::{CHANCE, Doubt, doubt, still};
 use super::finding::{Finding, Meaningless};
 use super::folds;
@@ -31,7 +32,7 @@ use super::told::{Told, finding, is_outdone, promoted};
 use super::traces;
 use super::unexplained;
 use super::whereabouts::whereabouts;
-use crate::effects::{Library, Place, RecordingFacts, in_words};
+use crate::effects::{Candidate, Library, Place, RecordingFacts, in_words};
 use crate::feature::Dimension;
 use crate::machine::Machine;
 use crate::units::{ByQuantity, Quantity};
@@ -374,9 +375,13 @@ fn proved(
     (machine, facts): (&Machine, &RecordingFacts),
     noise: &[Noise],
 ) -> Option<Vec<ModelTerm>> {
-    // No other recording has this one's clock.
-    let lasting = in_model.iter().filter(|effect| !search.goes_by_clock(effect.candidate));
-    let mut names: Vec<ModelTerm> = lasting.cloned().collect();
+    let patched = search.patched(in_model).filter(|_| Rule::Patches.decides());
+    let is_patch = |candidate: &Candidate| patched == Some(candidate.place) && is_of_position(candidate);
+    // No other recording has this one's clock, and patches of a curve are no names.
+    let is_name = |effect: &&ModelTerm| {
+        !search.goes_by_clock(effect.candidate) && !is_patch(&search.candidates[effect.candidate])
+    };
+    let mut names: Vec<ModelTerm> = in_model.iter().filter(is_name).cloned().collect();
     let is_empty = |names: &[ModelTerm], i: usize| {
         is_outdone(&placebo(search, names, i, machine)) || says_no_more(search, names, i)
     };
