@@ -432,3 +432,27 @@ pub fn samples_of(recording: &Recording, machine: &Machine, dead_bands: &[f64]) 
     };
     Follow::new(machine, recording.chunks()?, &options).map(|item| item.map(|(_, samples)| samples)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{FAR, JointSamples, Samples};
+
+    #[test]
+    fn a_joint_that_moves_at_once_may_have_turned_round_just_before_as_one_that_rests_may() {
+        let one = |travelled: &[f64], since: &[f64]| JointSamples {
+            direction: vec![1.0; travelled.len()],
+            since_reversal: since.to_vec(),
+            travelled: travelled.to_vec(),
+            ..JointSamples::default()
+        };
+        let moves = one(&[0.0, 0.1, 0.2], &[FAR, FAR, FAR]);
+        // It turns round before its last sample: what follows that is known.
+        let rests = one(&[0.0, 0.0, 0.3], &[FAR, FAR, 0.1]);
+        let turned =
+            Samples { len: 3, joints: vec![Some(moves), Some(rests)], ..Samples::default() }.turned_before();
+        let of =
+            |j: usize| turned.joints[j].as_ref().map(|of| (of.direction.clone(), of.since_reversal.clone()));
+        assert_eq!(of(0), Some((vec![-1.0, 1.0, 1.0], vec![0.0, 0.1, 0.2])));
+        assert_eq!(of(1), Some((vec![-1.0, -1.0, 1.0], vec![0.0, 0.0, 0.1])));
+    }
+}
