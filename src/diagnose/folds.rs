@@ -267,7 +267,7 @@ pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> 
             Some(_) => break,
             None => {
                 let (alone, all) = (folds.left_out(search, &|_| false), folds.left_out(search, &|_| true));
-                if is_harm(search, folds.fall(search, &alone, &all)) {
+                if is_harm(search.in_motion, folds.fall(search, &alone, &all)) {
                     kept.clear();
                 }
                 break;
@@ -282,8 +282,9 @@ pub(super) fn worst(search: &Search, in_model: &[ModelTerm], names: usize) -> Op
     Folds::new(search, in_model)?.worst(search, names)
 }
 
-fn is_harm(search: &Search, (gain, error): (f64, f64)) -> bool {
-    gain < if search.in_motion { -error } else { error }
+/// Whether an effect goes by which squares fall so much, with this standard error.
+fn is_harm(in_motion: bool, (gain, error): (f64, f64)) -> bool {
+    gain < if in_motion { -error } else { error }
 }
 
 /// Normal equations of all samples and of each fold.
@@ -358,7 +359,7 @@ impl Folds {
     /// Of the first `names` effects the one that does the greatest harm, if one does.
     fn worst(&self, search: &Search, names: usize) -> Option<usize> {
         let each = (0..names).map(|i| (i, self.gain(search, i)));
-        let worse = each.filter(|(_, gain)| is_harm(search, *gain));
+        let worse = each.filter(|(_, gain)| is_harm(search.in_motion, *gain));
         worse.min_by(|(_, (a, _)), (_, (b, _))| a.total_cmp(b)).map(|(i, _)| i)
     }
 
@@ -504,5 +505,23 @@ impl Folds {
                 None => residual[row],
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_harm;
+
+    #[test]
+    fn what_is_undecided_stays_along_a_path_and_goes_of_settled_positions() {
+        for (gain, along_a_path, settled) in
+            [(-2.0, true, true), (-0.5, false, true), (0.5, false, true), (2.0, false, false)]
+        {
+            assert_eq!(
+                (is_harm(true, (gain, 1.0)), is_harm(false, (gain, 1.0))),
+                (along_a_path, settled),
+                "{gain}"
+            );
+        }
     }
 }
