@@ -27,7 +27,7 @@ pub struct Finding {
     pub remedy: String,
     /// Its sizes.
     pub coefficients: Vec<Size>,
-    /// Probability that name and place are right, or are those of a hypothesis that the recordings cannot tell from it.
+    /// Probability that name and place are right.
     pub probability: f64,
     /// Half of it is the logarithm of the evidence for it.
     pub delta_bic: f64,
@@ -77,7 +77,12 @@ pub struct Meaningless {
 }
 
 impl Finding {
-    /// Names that cannot be told from its own count for its own: to the others goes what that leaves.
+    /// How likely it is that it is what its name says, or one of those that it may be instead.
+    pub(super) fn probability_of_all(&self) -> f64 {
+        self.probability + self.confusable_with.iter().map(|other| other.probability).sum::<f64>()
+    }
+
+    /// To other names goes no more than its own leaves.
     pub(super) fn share_out(&mut self) {
         let others: f64 = self.confusable_with.iter().map(|other| other.probability).sum();
         let left = (1.0 - self.probability).max(0.0);

@@ -89,7 +89,8 @@ pub(super) fn gain_elsewhere(search: &Search, in_model: &[ModelTerm], i: usize) 
     if motions.len() < 2 {
         return None;
     }
-    Folds::of(search, in_model, owner, stretches(search)?)?.gain_where_expected(search, i)
+    Folds::of(search, (search.rows.always(), in_model), owner, stretches(search)?)?
+        .gain_where_expected(search, i)
 }
 
 /// Where each joint of a recording has been, least and greatest.
@@ -259,9 +260,10 @@ fn grams(
 /// What foretells stretches that were left out, (68): effects without which these are foretold better go, the worst first, and all of them
 /// where together they do worse than geometry alone. In motion that has to be so by more than a standard error; what is undecided stays.
 /// Settled positions are few, and where none is repeated nothing tells their noise: there every effect has to prove itself, by as much.
+/// Judged as the file has them, where drives give way by what is named alone.
 pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> {
     let mut kept = in_model.to_vec();
-    while let Some(folds) = Folds::new(search, &kept) {
+    while let Some(folds) = Folds::rigid(search, &kept) {
         match folds.worst(search, kept.len()) {
             Some(worst) if Rule::HasToForetell.decides() => drop(kept.remove(worst)),
             Some(_) => break,
@@ -323,13 +325,23 @@ impl Folds {
     /// Stretches of every recording; `None` where there are too few rows, or a column cannot be built.
     fn new(search: &Search, told: &[ModelTerm]) -> Option<Self> {
         let stretch = stretches(search)?;
-        Self::of(search, told, stretch.clone(), stretch)
+        Self::of(search, (search.rows.always(), told), stretch.clone(), stretch)
     }
 
-    /// `owner`: the fold of each row; `stretch`: as [`stretches`].
-    fn of(search: &Search, told: &[ModelTerm], owner: Vec<usize>, stretch: Vec<usize>) -> Option<Self> {
-        let rows = search.rows;
-        let mut raw = rows.always();
+    /// The same, where drives give way by what is told alone.
+    fn rigid(search: &Search, told: &[ModelTerm]) -> Option<Self> {
+        let stretch = stretches(search)?;
+        Self::of(search, (search.rows.linear.constant.clone(), told), stretch.clone(), stretch)
+    }
+
+    /// `always`: columns of what every model has; `owner`: the fold of each row; `stretch`: as [`stretches`].
+    fn of(
+        search: &Search,
+        (always, told): (DMatrix<f64>, &[ModelTerm]),
+        owner: Vec<usize>,
+        stretch: Vec<usize>,
+    ) -> Option<Self> {
+        let (rows, mut raw) = (search.rows, always);
         let mut part = vec![Part::Geometry; raw.ncols()];
         let mut put = |own: &DMatrix<f64>, of: Part| {
             let at = raw.ncols();

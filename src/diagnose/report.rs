@@ -85,9 +85,9 @@ pub(super) fn report(
         .filter(|((i, ..), placebo)| is_outdone(placebo) || says_no_more(search, in_model, *i))
         .map(|((i, ..), _)| place(i))
         .collect();
-    // Of settled positions, names are told only where they foretell others.
+    // Along a path, it is likelier than not that one of the names that are told is right.
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
-        !empty.contains(&place(i)) && (!search.in_motion || finding.probability > LIKELY)
+        !empty.contains(&place(i)) && (!search.in_motion || finding.probability_of_all() > LIKELY)
     };
     if !told.iter().all(holds) {
         let unlikely = told.iter().filter(|told| !holds(told));
@@ -388,8 +388,17 @@ fn proved(
     let worst = |names: &[ModelTerm]| {
         least_foretold(search, names).or_else(|| (0..names.len()).find(|i| is_empty(names, *i)))
     };
-    while let Some(i) = worst(&names) {
-        names.remove(i);
+    let hold = |names: &mut Vec<ModelTerm>| {
+        while let Some(i) = worst(names) {
+            names.remove(i);
+        }
+    };
+    hold(&mut names);
+    if names.len() < in_model.len() {
+        // Where something goes, another name may be the better one for what stays.
+        search.swap(&mut names);
+        names.retain(|effect| is_name(&effect));
+        hold(&mut names);
     }
     if folds::remaining(search, noise, &names, 0).is_none_or(|part| part > HALF) {
         return None;

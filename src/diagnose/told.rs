@@ -1,10 +1,11 @@
 //! What is told by name: how likely it is, what else it may be, how large, and what to do.
 
 use super::diagnosis::Named;
+use super::evidence::log_sum_exp;
 use super::finding::{Confusable, Finding, Size};
 use super::held_out::Model;
 use super::names::{GivenName, Naming};
-use super::odds::{Odds, confusable, odds, trust};
+use super::odds::{LISTED, Odds, confusable, odds, trust};
 use super::placebo::Placebo;
 use super::policy::Rule;
 use super::search::Search;
@@ -17,8 +18,6 @@ use crate::units::ByQuantity;
 
 /// A common effect of which the shape is less than this part of all is what it looks like.
 const PLAIN: f64 = 0.01;
-/// Names whose odds are no less than this part of the best one's cannot be told from it.
-const ALIAS: f64 = 1.0 / 3.0;
 /// Logarithm of the odds at which a finding is told.
 const TOLD: f64 = 5.0;
 /// A name whose cause may be exchanged for a meaningless one, with evidence greater by this logarithm, is none.
@@ -64,6 +63,33 @@ pub(super) fn is_outdone(placebo: &Option<Placebo>) -> bool {
     placebo.as_ref().is_some_and(|placebo| placebo.ahead > OUTDONE && Rule::Outdone.decides())
 }
 
+/// Rivals of a name as what stands instead of it: what has its place beside the name as well is no other name for the same, (64).
+fn instead(
+    search: &Search,
+    in_model: &[ModelTerm],
+    own: &Hypothesis,
+    overdispersion: f64,
+    mut hypotheses: Vec<Hypothesis>,
+) -> Vec<Hypothesis> {
+    let counts =
+        |r: &Hypothesis| !search.is_form(r.candidate, own.candidate) && r.weight > own.weight + LISTED.ln();
+    if !hypotheses.iter().any(counts) {
+        return hypotheses;
+    }
+    let field = search.rows.field(search.beside(in_model, None));
+    for r in hypotheses.iter_mut().filter(|r| counts(r)) {
+        let (candidate, at) = (&search.candidates[r.candidate], &r.score.parameters);
+        let Some(score) = search.rows.score_at(candidate, at, &field, search.overdispersion) else {
+            continue;
+        };
+        // What its other parameters cost is as it was.
+        let weight = search.priors[r.candidate] + score.at_best + r.score.evidence - r.score.at_best;
+        let beside = search.tempered(&Hypothesis::new(r.candidate, weight, score), overdispersion);
+        r.weight -= log_sum_exp(&[0.0, beside.weight]);
+    }
+    hypotheses
+}
+
 /// What is said of effect `i`; nothing where its hypotheses leave too little evidence.
 pub(super) fn finding(
     search: &Search,
@@ -81,15 +107,12 @@ pub(super) fn finding(
         hypotheses.iter().filter(fit).map(|r| search.tempered(r, left.overdispersion)).collect();
     let own =
         hypotheses.iter().find(|r| r.candidate == effect.candidate).filter(|r| r.weight > TOLD).cloned()?;
+    let hypotheses = instead(search, in_model, &own, left.overdispersion, hypotheses);
     let is_plain = search.commonness[own.candidate] == 0.0 && shares.discrepancies < PLAIN * total;
     let odds = odds(search, &hypotheses, &own, left.overdispersion.max(search.overdispersion), is_plain);
-    let own_odds =
-        odds.iter().find(|o| o.hypothesis.candidate == own.candidate).map_or(0.0, |o| o.probability);
-    let is_alike = |o: &&Odds| {
-        o.probability >= ALIAS * own_odds || search.is_form(o.hypothesis.candidate, own.candidate)
-    };
-    let alike = odds.iter().filter(is_alike).map(|o| o.probability);
-    let probability = alike.sum::<f64>().min(1.0) * trust(shares.discrepancies / total, 2.0 * own.weight);
+    let is_own = |o: &&Odds| search.is_form(o.hypothesis.candidate, own.candidate);
+    let own_odds: f64 = odds.iter().filter(is_own).map(|o| o.probability).sum();
+    let probability = own_odds.min(1.0) * trust(shares.discrepancies / total, 2.0 * own.weight);
     let candidate = &search.candidates[effect.candidate];
     let family = &library.families()[candidate.family];
     let mut solved = model.effect(search, in_model, i, shares.departure());
