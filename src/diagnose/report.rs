@@ -388,17 +388,8 @@ fn proved(
     let worst = |names: &[ModelTerm]| {
         least_foretold(search, names).or_else(|| (0..names.len()).find(|i| is_empty(names, *i)))
     };
-    let hold = |names: &mut Vec<ModelTerm>| {
-        while let Some(i) = worst(names) {
-            names.remove(i);
-        }
-    };
-    hold(&mut names);
-    if names.len() < in_model.len() {
-        // Where something goes, another name may be the better one for what stays.
-        search.swap(&mut names);
-        names.retain(|effect| is_name(&effect));
-        hold(&mut names);
+    while let Some(i) = worst(&names) {
+        names.remove(i);
     }
     if folds::remaining(search, noise, &names, 0).is_none_or(|part| part > HALF) {
         return None;

@@ -8,6 +8,7 @@ use nalgebra::DMatrix;
 use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
 use super::drives::drives;
+use super::folds;
 use super::lag::{self, lagged};
 use super::linear::{Linear, linear};
 use super::noise::{self, Noise};
@@ -180,14 +181,14 @@ impl Case<'_> {
                 let overdispersion = search.leftover(&search.beside(&in_model, None)).overdispersion;
                 if overdispersion < HOT || !Rule::SearchesAgain.decides() {
                     let found = less_rare(&search, search.unfolded(in_model));
-                    let in_model = search.polished(&search.kept(&found));
+                    let in_model = search.polished(&folds::useful(&search, &found));
                     return Ok(report(&search, &in_model));
                 }
                 // Much is left, as it always is on real machines: the simplest names that stand out from it count.
                 let search =
                     Search { overdispersion, known: Mutex::default(), grounds: Mutex::default(), ..search };
                 let found = less_rare(&search, search.unfolded(search.run(&in_model, |_| true)));
-                in_model = search.polished(&search.kept(&found));
+                in_model = search.polished(&folds::useful(&search, &found));
                 if moves < MOVES
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {

@@ -77,16 +77,6 @@ impl Search<'_> {
         sound
     }
 
-    /// What foretells stretches that were left out, (68). Where something goes, another name may be the better one for what stays.
-    pub fn kept(&self, found: &[ModelTerm]) -> Vec<ModelTerm> {
-        let mut kept = folds::useful(self, found);
-        if kept.len() < found.len() {
-            self.swap(&mut kept);
-            kept = folds::useful(self, &kept);
-        }
-        kept
-    }
-
     /// The effect to be taken in next: what stands out beside those found, else what was taken for their shape.
     fn next(&self, in_model: &[ModelTerm]) -> Option<ModelTerm> {
         let shares = self.shares(in_model);
@@ -151,7 +141,7 @@ impl Search<'_> {
     }
 
     /// Every effect gives its place to a better one, beside the others; one that is no longer needed goes.
-    pub(super) fn swap(&self, in_model: &mut Vec<ModelTerm>) {
+    fn swap(&self, in_model: &mut Vec<ModelTerm>) {
         for _ in 0..2 {
             let mut changed = false;
             let mut i = 0;
