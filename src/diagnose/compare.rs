@@ -18,8 +18,6 @@ const SIMILAR: f64 = 0.8;
 const DISCREPANT: usize = 8;
 /// What comes within this part of the best one's energy is a matter of shape, and a rare name gives way to a common one.
 const UNKNOWN_DISCREPANCY: f64 = 0.002;
-/// So does one that needs more of a shape of its own: the whole slack is lost by one that owes this part of the energy to it.
-const DEPARTURE: f64 = 0.05;
 
 impl Search<'_> {
     /// Evidence of every candidate beside the effects in the model, better first.
@@ -95,13 +93,9 @@ impl Search<'_> {
             alike.iter().zip(weights).for_each(|(i, weight)| hypotheses[*i].weight = weight);
             let slack =
                 (UNKNOWN_DISCREPANCY * most).min(VISIBLE * rows.whitener.count() as f64 / overdispersion);
-            for hypothesis in &mut hypotheses[..close] {
-                let departure =
-                    ((most - hypothesis.reach / overdispersion) / (DEPARTURE * most)).clamp(0.0, 1.0);
-                let rare =
-                    if Rule::RareGivesWay.decides() { self.commonness[hypothesis.candidate] } else { 0.0 };
-                let departure = if Rule::DepartingGivesWay.decides() { departure } else { 0.0 };
-                hypothesis.weight += slack * (rare - departure);
+            if Rule::RareGivesWay.decides() {
+                let rare = |hypothesis: &Hypothesis| slack * self.commonness[hypothesis.candidate];
+                hypotheses[..close].iter_mut().for_each(|hypothesis| hypothesis.weight += rare(hypothesis));
             }
             hypotheses.sort_by(better_first);
         }

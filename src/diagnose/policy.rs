@@ -12,14 +12,10 @@ pub(super) enum Rule {
     MayDepart,
     /// Of names that come near the best, a rare one gives way (`compare.rs`).
     RareGivesWay,
-    /// So does one that needs more of a shape of its own (`compare.rs`).
-    DepartingGivesWay,
     /// A name is as likely as all its forms together (`compare.rs`).
     FormsTogether,
     /// A shape of its own lends a name no more than a part of what it takes (`reach.rs`).
     OwnShapeIsLimited,
-    /// A wave comes before its overtone (`refine.rs`).
-    WaveBeforeOvertone,
     /// Play of unusual size gives way to a usual lag where there is one speed (`speeds.rs`).
     UsualSizeFirst,
 

@@ -2,7 +2,6 @@
 
 use super::equations::Score;
 use super::marginal::solved;
-use super::policy::Rule;
 use super::score::{Field, Rows};
 use super::terms::Hypothesis;
 use crate::effects::{Candidate, Parameter};
@@ -13,10 +12,6 @@ const ROUNDS: usize = 2;
 const PARABOLAS: usize = 12;
 const WORTHWHILE: f64 = 0.3;
 const HALVINGS: usize = 9;
-
-/// A wave of half the period comes first unless it falls behind by this, a logarithm: hardly any machine's error is nothing but an
-/// overtone.
-const OVERTONE: f64 = 4.0;
 
 /// Sine and cosine; a wave whose own ones are smaller than this part of its overtone's is that overtone.
 const PAIR: usize = 2;
@@ -43,12 +38,10 @@ pub(super) fn refine(
     });
     let all: Vec<Hypothesis> = others.chain([best.clone()]).collect();
     let weight = |r: &Hypothesis| {
-        let has_half =
-            all.iter().any(|other| candidate.is_half(&other.score.parameters, &r.score.parameters));
-        match has_half {
-            true if is_overtone_alone(rows, candidate, &r.score, field) => NEVER,
-            true if Rule::WaveBeforeOvertone.decides() => r.weight - OVERTONE,
-            _ => r.weight,
+        let is_half = |other: &Hypothesis| candidate.is_half(&other.score.parameters, &r.score.parameters);
+        match all.iter().any(is_half) && is_overtone_alone(rows, candidate, &r.score, field) {
+            true => NEVER,
+            false => r.weight,
         }
     };
     all.iter().max_by(|a, b| weight(a).total_cmp(&weight(b))).cloned().unwrap_or(best)
