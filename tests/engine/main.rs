@@ -10,6 +10,7 @@ mod data_sets;
 mod harness;
 
 mod alignment;
+mod alike;
 mod bad_recordings;
 mod blind;
 mod concealment;
