@@ -180,15 +180,11 @@ impl Case<'_> {
             if round == NOISE_ROUNDS || is_settled(&judged) {
                 let overdispersion = search.leftover(&search.beside(&in_model, None)).overdispersion;
                 if overdispersion < HOT || !Rule::SearchesAgain.decides() {
-                    let found = less_rare(&search, search.unfolded(in_model));
-                    let in_model = search.polished(&folds::useful(&search, &found));
-                    return Ok(report(&search, &in_model));
+                    return Ok(report(&search, &kept(&search, search.unfolded(in_model))));
                 }
                 // Much is left, as it always is on real machines: the simplest names that stand out from it count.
-                let search =
-                    Search { overdispersion, known: Mutex::default(), grounds: Mutex::default(), ..search };
-                let found = less_rare(&search, search.unfolded(search.run(&in_model, |_| true)));
-                in_model = search.polished(&folds::useful(&search, &found));
+                let search = search.against(overdispersion);
+                in_model = kept(&search, search.unfolded(search.run(&in_model, |_| true)));
                 if moves < MOVES
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
@@ -201,6 +197,11 @@ impl Case<'_> {
             (noise, round) = (judged, round + 1);
         }
     }
+}
+
+/// Of what the search found, the effects that foretell what was left out, where nothing is left to be gained by their parameters.
+fn kept(search: &Search, found: Vec<ModelTerm>) -> Vec<ModelTerm> {
+    search.polished(&folds::useful(search, &less_rare(search, found)))
 }
 
 /// Families that are met more often than this part of the most frequent one are common.

@@ -123,9 +123,14 @@ impl Search<'_> {
 
     /// The same rows where no drive gives way but those that are asked for.
     pub fn rigid<'b>(&'b self, rows: &'b Rows<'b>) -> Search<'b> {
+        Search { rows, base: rows.base(), ..self.against(self.overdispersion) }
+    }
+
+    /// The same where chance counts as so much larger than the noise says.
+    pub fn against(&self, overdispersion: f64) -> Search<'_> {
         Search {
-            rows,
-            base: rows.base(),
+            overdispersion,
+            base: self.base.clone(),
             priors: self.priors.clone(),
             commonness: self.commonness.clone(),
             known: Mutex::default(),

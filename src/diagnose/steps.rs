@@ -12,6 +12,8 @@ use super::terms::{Hypothesis, ModelTerm, all_but};
 
 /// So many candidates that came next to an effect are compared with it again and again.
 pub(super) const NEAR: usize = 40;
+/// So many times every effect is held against all that may stand in its place.
+const PASSES: usize = 2;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// The same among settled positions, where many joints give way a little each.
@@ -141,37 +143,57 @@ impl Search<'_> {
     }
 
     /// Every effect gives its place to a better one, beside the others; one that is no longer needed goes.
+    ///
+    /// Among the others an effect has a shape of its own, in its place it has not: so exchanges may come back to where they were. Of sets
+    /// that do not stand, the one stays that foretells best what was left out, (68).
     fn swap(&self, in_model: &mut Vec<ModelTerm>) {
-        for _ in 0..2 {
-            let mut changed = false;
-            let mut i = 0;
-            while i < in_model.len() {
-                let hypotheses = self.rivals_of(in_model, i);
-                let others = all_but(in_model, Some(i));
-                let mut worthy = hypotheses.iter().take_while(|r| r.weight > ENTER);
-                let Some(best) = worthy.find(|r| !self.repeats(r, &others)) else {
-                    in_model.remove(i);
-                    changed = true;
-                    continue;
-                };
-                // What it was worth when it was taken in counts no longer: the others have changed.
-                let ground = self.ground(in_model, Some(i));
-                let own = &in_model[i];
-                let candidate = &self.candidates[own.candidate];
-                let field = self.rows.field(ground.clone());
-                let now = self.rows.score_at(candidate, &own.score.parameters, &field, self.overdispersion);
-                let now =
-                    now.filter(|now| best.candidate == own.candidate && best.score.gain <= now.gain + 0.5);
-                changed |= now.is_none();
-                let hypothesis = now.map(|score| Hypothesis::new(own.candidate, best.weight, score));
-                if let Some(entered) = self.settle(hypothesis.as_ref().unwrap_or(best), &ground) {
-                    in_model[i] = entered.instead_of(&in_model[i]);
-                }
-                i += 1;
-            }
-            if !changed {
-                break;
+        let mut before = Vec::new();
+        for _ in 0..PASSES {
+            before.push(in_model.clone());
+            if !self.exchange(in_model) {
+                return;
             }
         }
+        let of = |set: &[ModelTerm]| -> Vec<usize> { set.iter().map(|effect| effect.candidate).collect() };
+        if before.last().is_some_and(|last| of(last) == of(in_model)) {
+            return;
+        }
+        // Where one went, no set of before will do.
+        let count = in_model.len();
+        for set in before.into_iter().filter(|set| set.len() == count) {
+            if folds::foretell_better(self, &set, in_model) {
+                *in_model = set;
+            }
+        }
+    }
+
+    /// Every effect gives its place once, if there is a better one; whether one did.
+    fn exchange(&self, in_model: &mut Vec<ModelTerm>) -> bool {
+        let mut changed = false;
+        let mut i = 0;
+        while i < in_model.len() {
+            let hypotheses = self.rivals_of(in_model, i);
+            let others = all_but(in_model, Some(i));
+            let mut worthy = hypotheses.iter().take_while(|r| r.weight > ENTER);
+            let Some(best) = worthy.find(|r| !self.repeats(r, &others)) else {
+                in_model.remove(i);
+                changed = true;
+                continue;
+            };
+            // What it was worth when it was taken in counts no longer: the others have changed.
+            let ground = self.ground(in_model, Some(i));
+            let own = &in_model[i];
+            let candidate = &self.candidates[own.candidate];
+            let field = self.rows.field(ground.clone());
+            let now = self.rows.score_at(candidate, &own.score.parameters, &field, self.overdispersion);
+            let now = now.filter(|now| best.candidate == own.candidate && best.score.gain <= now.gain + 0.5);
+            changed |= now.is_none();
+            let hypothesis = now.map(|score| Hypothesis::new(own.candidate, best.weight, score));
+            if let Some(entered) = self.settle(hypothesis.as_ref().unwrap_or(best), &ground) {
+                in_model[i] = entered.instead_of(&in_model[i]);
+            }
+            i += 1;
+        }
+        changed
     }
 }
