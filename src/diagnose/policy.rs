@@ -48,8 +48,6 @@ pub(super) enum Rule {
     Unfolds,
     /// Where much is left the search runs again against that (`rounds.rs`).
     SearchesAgain,
-    /// A memory that is long may be a misfit, where nothing was found (`rounds.rs`).
-    ForgetsFirst,
     /// Settled positions are asked again which of them are off (`rounds.rs`).
     OutliersAgain,
     /// What is off at every reversal is no outlier (`noise.rs`).

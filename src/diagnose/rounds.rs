@@ -32,8 +32,6 @@ const NOISE_ROUNDS: usize = 3;
 const MOVES: usize = 3;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
-/// What is left counts as more than noise beyond this many standard deviations of chance.
-const BEYOND_NOISE: f64 = 5.0;
 
 /// What is diagnosed.
 pub(super) struct Case<'a> {
@@ -90,7 +88,7 @@ impl Case<'_> {
         // What is left is noise, once everything else is modelled: the noise is judged anew from it.
         let mut noise = noise::of(&linear, &linear.residual, &runs, &out, facts);
         let mut in_model: Vec<ModelTerm> = Vec::new();
-        let (mut round, mut moves, mut forgot) = (1, 0, false);
+        let (mut round, mut moves) = (1, 0);
         let mut origin: Option<Origin> = None;
         loop {
             let rows = Rows::new(
@@ -166,14 +164,6 @@ impl Case<'_> {
                     (linear, noise, in_model, moves) = (origin.linear, origin.noise, Vec::new(), 0);
                     coarse = Coarse::new(&linear, &candidates);
                     give_way = drives_of(&linear, &coarse);
-                    continue;
-                }
-            }
-            if in_model.is_empty() && !forgot && noise.iter().any(Noise::is_long) {
-                // So long a memory may be a misfit that was taken for noise.
-                let left = search.leftover(&search.base);
-                if left.beyond > BEYOND_NOISE && Rule::ForgetsFirst.decides() {
-                    (noise, forgot) = (noise.iter().map(Noise::shortened).collect(), true);
                     continue;
                 }
             }
