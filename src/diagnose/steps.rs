@@ -145,7 +145,8 @@ impl Search<'_> {
     /// Every effect gives its place to a better one, beside the others; one that is no longer needed goes.
     ///
     /// Among the others an effect has a shape of its own, in its place it has not: so exchanges may come back to where they were. Of sets
-    /// that do not stand, the one stays that foretells best what was left out, (68).
+    /// that do not stand, the one stays that foretells best what was left out, (68); of settled positions, whose noise is only known by
+    /// what is left, the last one.
     fn swap(&self, in_model: &mut Vec<ModelTerm>) {
         let mut before = Vec::new();
         for _ in 0..PASSES {
@@ -155,7 +156,8 @@ impl Search<'_> {
             }
         }
         let of = |set: &[ModelTerm]| -> Vec<usize> { set.iter().map(|effect| effect.candidate).collect() };
-        if before.last().is_some_and(|last| of(last) == of(in_model)) {
+        let stands = before.last().is_some_and(|last| of(last) == of(in_model));
+        if stands || !self.in_motion {
             return;
         }
         // Where one went, no set of before will do.
