@@ -78,8 +78,13 @@ pub(super) fn doubt(
 }
 
 /// What is still without a name when names were found for a part of it.
-pub(super) fn still(search: &Search, found: &Marginal, doubt: Doubt, has_parts: bool) -> Option<Doubt> {
-    let (left, all) = (search.leftover(found), search.leftover(&search.base));
+pub(super) fn still(
+    search: &Search,
+    (known, found): (&[ModelTerm], &Marginal),
+    doubt: Doubt,
+    has_parts: bool,
+) -> Option<Doubt> {
+    let (left, all) = (search.leftover(found), search.leftover(&search.reference(known)));
     let is_much = left.beyond > CHANCE && left.energy > TOLERATED * all.energy;
     (is_much || has_parts).then_some(Doubt { energy: left.energy, ..doubt })
 }

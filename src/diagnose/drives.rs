@@ -6,22 +6,52 @@ use super::coarse::Coarse;
 use super::linear::Linear;
 use super::score::{Rows, joined};
 use super::whitener::Whitener;
-use crate::effects::{Candidate, Library};
+use crate::effects::{Candidate, Library, Place};
 
 /// Drives give way by about this part of what a family that is said by name usually does, before readings are asked.
 const GIVE_WAY: f64 = 0.02;
 
-/// Columns of the families with `of_every_drive` at all joints of what follows a path, m and rad, each times what is expected of it.
-pub(super) fn drives(
-    linear: &Linear,
-    coarse: &Coarse,
-    candidates: &[Candidate],
-    library: &Library,
-) -> DMatrix<f64> {
-    let count = linear.residual.len();
-    let none = DMatrix::zeros(count, 0);
-    let rows = Rows::new(linear, &none, coarse, Whitener::new(count, &[], &[], vec![false; count]));
-    let stand = |c: &&Candidate| library.families()[c.family].of_every_drive && c.parameters.is_empty();
-    let own = candidates.iter().filter(stand).filter_map(|candidate| rows.raw(candidate, &[]));
-    own.fold(none.clone(), |all, own| joined(all, &(own * GIVE_WAY)))
+/// How drives give way.
+pub(super) struct Drives {
+    /// A column for each, m and rad, times what is expected of it.
+    columns: DMatrix<f64>,
+    /// Family and place of each.
+    of: Vec<(usize, Place)>,
+}
+
+impl Drives {
+    /// Rigid ones, of so many readings.
+    pub fn none(readings: usize) -> Self {
+        Drives { columns: DMatrix::zeros(readings, 0), of: Vec::new() }
+    }
+
+    /// The families with `of_every_drive` at all joints of what follows a path.
+    pub fn new(linear: &Linear, coarse: &Coarse, candidates: &[Candidate], library: &Library) -> Self {
+        let count = linear.residual.len();
+        let none = Drives::none(count);
+        let rows = Rows::new(linear, &none, coarse, Whitener::new(count, &[], &[], vec![false; count]));
+        let mut all = Drives::none(count);
+        for candidate in candidates {
+            if library.families()[candidate.family].of_every_drive
+                && candidate.parameters.is_empty()
+                && let Some(own) = rows.raw(candidate, &[])
+            {
+                all.of.extend(vec![(candidate.family, candidate.place); own.ncols()]);
+                all.columns = joined(all.columns, &(own * GIVE_WAY));
+            }
+        }
+        all
+    }
+
+    /// Whether a name stands for one.
+    pub fn is_any(&self, is_named: impl Fn(usize, Place) -> bool) -> bool {
+        self.of.iter().any(|(family, place)| is_named(*family, *place))
+    }
+
+    /// Columns of those that no name stands for.
+    pub fn beside(&self, is_named: impl Fn(usize, Place) -> bool) -> DMatrix<f64> {
+        let unnamed: Vec<usize> =
+            (0..self.of.len()).filter(|column| !is_named(self.of[*column].0, self.of[*column].1)).collect();
+        self.columns.select_columns(&unnamed)
+    }
 }

@@ -89,7 +89,7 @@ pub(super) fn gain_elsewhere(search: &Search, in_model: &[ModelTerm], i: usize) 
     if motions.len() < 2 {
         return None;
     }
-    Folds::of(search, (search.rows.always(), in_model), owner, stretches(search)?)?
+    Folds::of(search, (search.always(in_model), in_model), owner, stretches(search)?)?
         .gain_where_expected(search, i)
 }
 
@@ -179,7 +179,7 @@ impl Normal {
     fn new(search: &Search, in_model: &[ModelTerm]) -> Option<Self> {
         let rows = search.rows;
         let fold_of = stretches(search)?;
-        let mut white = rows.always();
+        let mut white = search.always(in_model);
         rows.whiten(&mut white);
         let mut owner = vec![None; white.ncols()];
         // Where one stands for what was the shape of another, the shape of either would do without the other.
@@ -325,7 +325,7 @@ impl Folds {
     /// Stretches of every recording; `None` where there are too few rows, or a column cannot be built.
     fn new(search: &Search, told: &[ModelTerm]) -> Option<Self> {
         let stretch = stretches(search)?;
-        Self::of(search, (search.rows.always(), told), stretch.clone(), stretch)
+        Self::of(search, (search.always(told), told), stretch.clone(), stretch)
     }
 
     /// The same, where drives give way by what is told alone.

@@ -49,7 +49,7 @@ impl Solved {
 
 impl Model {
     pub fn new(search: &Search, in_model: &[ModelTerm]) -> Self {
-        let mut columns = search.rows.always();
+        let mut columns = search.always(in_model);
         search.rows.whiten(&mut columns);
         let mut offsets = Vec::new();
         for effect in in_model {
@@ -112,7 +112,7 @@ impl Model {
     ) -> Vec<f64> {
         let linear = search.rows.linear;
         let mut left = DVector::from_column_slice(&linear.residual);
-        let always = search.rows.always();
+        let always = search.always(in_model);
         left -= &always * self.solution.rows(0, always.ncols());
         for (i, effect) in in_model.iter().enumerate() {
             let candidate = &search.candidates[effect.candidate];

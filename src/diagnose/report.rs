@@ -1,6 +1,5 @@
 //! From what the search took in to what is said: which names hold, what is unexplained, and all figures.
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::approaches::{approaches, stand_still};
@@ -8,6 +7,7 @@ use super::contained::says_no_more;
 use super::diagnosis::{Diagnosis, Named, SharedEffect, Thinned};
 use super::discrepancy::is_of_position;
 use super::doubt::{CHANCE, Doubt, doubt, still};
+use super::drives::Drives;
 use super::finding::{Finding, Meaningless};
 use super::folds;
 use super::held_out::Model;
@@ -280,7 +280,7 @@ impl Findings {
         let found = search.beside_names(&known);
         let is_named = is_rest || self.is_proved || !naming.told.is_empty();
         let doubt = match is_named {
-            true => still(search, &found, doubt, !shown_parts.is_empty()),
+            true => still(search, (&known, &found), doubt, !shown_parts.is_empty()),
             false => Some(doubt),
         };
         let left = if is_named { &found } else { &search.base };
@@ -305,7 +305,7 @@ impl Modelled {
     ) -> Diagnosis {
         let Modelled { mut told, shared_effects, of_shared, parts, of_parts, unexplained, proposals } = self;
         // Figures are of what the file has.
-        let none = DMatrix::zeros(search.rows.residual.len(), 0);
+        let none = Drives::none(search.rows.residual.len());
         let rows = search.rows.with(&none);
         let search = &search.rigid(&rows);
         let linear = search.rows.linear;

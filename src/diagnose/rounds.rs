@@ -3,11 +3,9 @@
 use std::borrow::Cow;
 use std::sync::Mutex;
 
-use nalgebra::DMatrix;
-
 use super::coarse::Coarse;
 use super::diagnosis::Diagnosis;
-use super::drives::drives;
+use super::drives::Drives;
 use super::folds;
 use super::lag::{self, lagged};
 use super::linear::{Linear, linear};
@@ -76,8 +74,8 @@ impl Case<'_> {
         let runs = noise::runs(&linear);
         let mut coarse = Coarse::new(&linear, &candidates);
         let drives_of = |linear: &Linear, coarse: &Coarse| match in_motion {
-            true => drives(linear, coarse, plain, library),
-            false => DMatrix::zeros(linear.residual.len(), 0),
+            true => Drives::new(linear, coarse, plain, library),
+            false => Drives::none(linear.residual.len()),
         };
         let mut give_way = drives_of(&linear, &coarse);
         let mut out = noise::outliers(&linear, &runs, facts.are_smooth());

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cells::CellSums;
 use super::coarse::{Coarse, OnLevel};
+use super::drives::Drives;
 use super::equations::{
     BATCH, Best, Column, Equations, Key, ROOM, Score, best, judge, key, lengths, unit_size,
 };
@@ -15,15 +16,14 @@ use super::linear::Linear;
 use super::marginal::Marginal;
 use super::past::Pasts;
 use super::whitener::Whitener;
-use crate::effects::Candidate;
+use crate::effects::{Candidate, Place};
 use crate::lie::Twist;
 use crate::variation::Slot;
 
 /// Rows of the recordings and what turns them white.
 pub(super) struct Rows<'a> {
     pub linear: &'a Linear,
-    /// How drives give way, columns as they are.
-    drives: &'a DMatrix<f64>,
+    drives: &'a Drives,
     pub whitener: Whitener,
     /// Whitened residuals of the constant model.
     pub residual: DVector<f64>,
@@ -62,7 +62,7 @@ pub(super) fn joined(first: DMatrix<f64>, second: &DMatrix<f64>) -> DMatrix<f64>
 }
 
 impl<'a> Rows<'a> {
-    pub fn new(linear: &'a Linear, drives: &'a DMatrix<f64>, coarse: &'a Coarse, whitener: Whitener) -> Self {
+    pub fn new(linear: &'a Linear, drives: &'a Drives, coarse: &'a Coarse, whitener: Whitener) -> Self {
         let mut residual = DVector::zeros(linear.residual.len());
         whitener.apply(&linear.residual, residual.as_mut_slice());
         Rows {
@@ -94,25 +94,30 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way.
-    pub fn always(&self) -> DMatrix<f64> {
-        joined(self.linear.constant.clone(), self.drives)
+    /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way that no name stands for.
+    pub fn always(&self, is_named: impl Fn(usize, Place) -> bool) -> DMatrix<f64> {
+        joined(self.linear.constant.clone(), &self.drives.beside(is_named))
     }
 
     /// The same, marginalised.
     pub fn base(&self) -> Marginal {
-        let mut columns = self.always();
+        self.base_but(|_, _| false)
+    }
+
+    /// The same but for drives that a name stands for.
+    pub fn base_but(&self, is_named: impl Fn(usize, Place) -> bool) -> Marginal {
+        let mut columns = self.always(is_named);
         self.whiten(&mut columns);
         Marginal::new(columns)
     }
 
     /// The same rows where only what is asked for gives way.
-    pub fn with(&self, drives: &'a DMatrix<f64>) -> Rows<'a> {
+    pub fn with(&self, drives: &'a Drives) -> Rows<'a> {
         Rows::new(self.linear, drives, self.coarse, self.whitener.clone())
     }
 
     /// How drives give way.
-    pub fn drives(&self) -> &'a DMatrix<f64> {
+    pub fn drives(&self) -> &'a Drives {
         self.drives
     }
 

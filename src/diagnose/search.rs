@@ -10,7 +10,7 @@ use super::marginal::Marginal;
 use super::policy::Rule;
 use super::score::Rows;
 use super::terms::{Hypothesis, Mark, ModelTerm, all_but, side_by_side};
-use crate::effects::Candidate;
+use crate::effects::{Candidate, Place};
 
 pub(super) struct Search<'a> {
     pub rows: &'a Rows<'a>,
@@ -67,6 +67,26 @@ impl Search<'_> {
         let overdispersion = (overdispersion / self.overdispersion).max(1.0);
         let prior = self.priors[hypothesis.candidate];
         Hypothesis { weight: prior + (hypothesis.weight - prior) / overdispersion, ..hypothesis.clone() }
+    }
+
+    /// Columns of what every model has, m and rad, but for drives that these effects name: what these say of them is theirs.
+    pub fn always(&self, in_model: &[ModelTerm]) -> DMatrix<f64> {
+        self.rows.always(self.names(in_model))
+    }
+
+    /// The marginal beside that.
+    pub fn reference(&self, in_model: &[ModelTerm]) -> Marginal {
+        match self.rows.drives().is_any(self.names(in_model)) {
+            true => self.rows.base_but(self.names(in_model)),
+            false => self.base.clone(),
+        }
+    }
+
+    /// Whether one of these effects is of this family and at this place.
+    fn names(&self, in_model: &[ModelTerm]) -> impl Fn(usize, Place) -> bool {
+        let of = |effect: &ModelTerm| &self.candidates[effect.candidate];
+        let named: Vec<(usize, Place)> = in_model.iter().map(|e| (of(e).family, of(e).place)).collect();
+        move |family, place| named.contains(&(family, place))
     }
 
     /// The marginal beside all effects in the model but one.

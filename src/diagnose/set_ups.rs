@@ -105,7 +105,7 @@ const ELSEWHERE: f64 = 1e-12;
 impl SetUps {
     fn new(search: &Search, names: &[String], effects: &[DMatrix<f64>]) -> Self {
         let linear = search.rows.linear;
-        let mut raw = search.rows.always();
+        let mut raw = search.rows.always(|_, _| false);
         for own in effects {
             let at = raw.ncols();
             raw = raw.insert_columns(at, own.ncols(), 0.0);

@@ -3,9 +3,8 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
-
 use super::diagnosis::Named;
+use super::drives::Drives;
 use super::held_out::Model;
 use super::search::Search;
 use super::set_ups;
@@ -36,7 +35,7 @@ pub(super) fn effects(search: &Search, library: &Library, kept: &[ModelTerm]) ->
         return Vec::new();
     }
     // Against geometry and names alone: what stands anyhow says nothing for itself.
-    let none = DMatrix::zeros(search.rows.residual.len(), 0);
+    let none = Drives::none(search.rows.residual.len());
     let rows = search.rows.with(&none);
     let search = &search.rigid(&rows);
     while !left.is_empty() {

@@ -101,7 +101,7 @@ impl Search<'_> {
             false => taken(&names, &names.with(&side_by_side(&courses, self.rows.residual.len()))),
         };
         Shares {
-            names: taken(&self.base, &names),
+            names: taken(&self.reference(in_model), &names),
             discrepancies: taken(&names, &full),
             free,
             left: self.leftover(&full),
