@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::diagnosis::Named;
 use super::drives::Drives;
+use super::folds;
 use super::held_out::Model;
 use super::search::Search;
 use super::set_ups;
@@ -52,14 +53,18 @@ pub(super) fn effects(search: &Search, library: &Library, kept: &[ModelTerm]) ->
         left.retain(|i| *i != best.candidate);
         all.extend(search.enter(&best, &marginal));
     }
+    let without = |all: &[ModelTerm], goes: &dyn Fn(&ModelTerm) -> bool| -> Vec<ModelTerm> {
+        let stays = |(i, effect): &(usize, &ModelTerm)| *i < kept.len() || !goes(effect);
+        all.iter().enumerate().filter(stays).map(|(_, effect)| effect.clone()).collect()
+    };
+    let family = |effect: &ModelTerm| &library.families()[of(effect.candidate).family];
+    // Drives are told by what they do all together: where that foretells no more, it is another law's.
+    let rigid = without(&all, &|effect| search.in_motion && family(effect).of_every_drive);
+    if rigid.len() < all.len() && !folds::are_better(search, &all, &rigid) {
+        all = rigid;
+    }
     // What every joint has may still be different from what it is taken for, where set-ups that are left out do not bear it out.
-    let of_set_up = |effect: &ModelTerm| library.families()[of(effect.candidate).family].each_setup;
-    let borne_out: Vec<ModelTerm> = all
-        .iter()
-        .enumerate()
-        .filter(|(i, e)| *i < kept.len() || of_set_up(e))
-        .map(|(_, e)| e.clone())
-        .collect();
+    let borne_out = without(&all, &|effect| !family(effect).each_setup);
     if borne_out.len() < all.len() && set_ups::foretell(search, &all, &borne_out) == Some(false) {
         all = borne_out;
     }
