@@ -15,8 +15,8 @@ const GIVE_WAY: f64 = 0.02;
 pub(super) struct Drives {
     /// A column for each, m and rad, times what is expected of it.
     columns: DMatrix<f64>,
-    /// Family and place of each.
-    of: Vec<(usize, Place)>,
+    /// Effect and place of each.
+    of: Vec<(String, Place)>,
 }
 
 impl Drives {
@@ -36,7 +36,7 @@ impl Drives {
                 && candidate.parameters.is_empty()
                 && let Some(own) = rows.raw(candidate, &[])
             {
-                all.of.extend(vec![(candidate.family, candidate.place); own.ncols()]);
+                all.of.extend(vec![(candidate.effect.clone(), candidate.place); own.ncols()]);
                 all.columns = joined(all.columns, &(own * GIVE_WAY));
             }
         }
@@ -44,14 +44,13 @@ impl Drives {
     }
 
     /// Whether a name stands for one.
-    pub fn is_any(&self, is_named: impl Fn(usize, Place) -> bool) -> bool {
-        self.of.iter().any(|(family, place)| is_named(*family, *place))
+    pub fn is_any(&self, is_named: impl Fn(&str, Place) -> bool) -> bool {
+        self.of.iter().any(|(effect, place)| is_named(effect, *place))
     }
 
     /// Columns of those that no name stands for.
-    pub fn beside(&self, is_named: impl Fn(usize, Place) -> bool) -> DMatrix<f64> {
-        let unnamed: Vec<usize> =
-            (0..self.of.len()).filter(|column| !is_named(self.of[*column].0, self.of[*column].1)).collect();
-        self.columns.select_columns(&unnamed)
+    pub fn beside(&self, is_named: impl Fn(&str, Place) -> bool) -> DMatrix<f64> {
+        let unnamed = self.of.iter().enumerate().filter(|(_, (effect, place))| !is_named(effect, *place));
+        self.columns.select_columns(&unnamed.map(|(column, _)| column).collect::<Vec<_>>())
     }
 }

@@ -95,7 +95,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Columns of what every model has, m and rad: everything constant, and behind it how drives give way that no name stands for.
-    pub fn always(&self, is_named: impl Fn(usize, Place) -> bool) -> DMatrix<f64> {
+    pub fn always(&self, is_named: impl Fn(&str, Place) -> bool) -> DMatrix<f64> {
         joined(self.linear.constant.clone(), &self.drives.beside(is_named))
     }
 
@@ -105,7 +105,7 @@ impl<'a> Rows<'a> {
     }
 
     /// The same but for drives that a name stands for.
-    pub fn base_but(&self, is_named: impl Fn(usize, Place) -> bool) -> Marginal {
+    pub fn base_but(&self, is_named: impl Fn(&str, Place) -> bool) -> Marginal {
         let mut columns = self.always(is_named);
         self.whiten(&mut columns);
         Marginal::new(columns)

@@ -82,11 +82,10 @@ impl Search<'_> {
         }
     }
 
-    /// Whether one of these effects is of this family and at this place.
-    fn names(&self, in_model: &[ModelTerm]) -> impl Fn(usize, Place) -> bool {
-        let of = |effect: &ModelTerm| &self.candidates[effect.candidate];
-        let named: Vec<(usize, Place)> = in_model.iter().map(|e| (of(e).family, of(e).place)).collect();
-        move |family, place| named.contains(&(family, place))
+    /// Whether one of these effects has this name and place.
+    fn names(&self, in_model: &[ModelTerm]) -> impl Fn(&str, Place) -> bool {
+        let named = in_model.iter().map(|effect| &self.candidates[effect.candidate]);
+        move |effect, place| named.clone().any(|own| own.effect == effect && own.place == place)
     }
 
     /// The marginal beside all effects in the model but one.
