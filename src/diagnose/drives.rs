@@ -2,11 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::coarse::Coarse;
-use super::linear::Linear;
-use super::score::{Rows, joined};
-use super::whitener::Whitener;
-use crate::effects::{Candidate, Library, Place};
+use super::terms::joined;
+use crate::effects::{Candidate, Place};
 
 /// Drives give way by about this part of what a family that is said by name usually does, before readings are asked.
 const GIVE_WAY: f64 = 0.02;
@@ -25,22 +22,11 @@ impl Drives {
         Drives { columns: DMatrix::zeros(readings, 0), of: Vec::new() }
     }
 
-    /// The families with `of_every_drive` at all joints of what follows a path.
-    pub fn new(linear: &Linear, coarse: &Coarse, candidates: &[Candidate], library: &Library) -> Self {
-        let count = linear.residual.len();
-        let none = Drives::none(count);
-        let rows = Rows::new(linear, &none, coarse, Whitener::new(count, &[], &[], vec![false; count]));
-        let mut all = Drives::none(count);
-        for candidate in candidates {
-            if library.families()[candidate.family].of_every_drive
-                && candidate.parameters.is_empty()
-                && let Some(own) = rows.raw(candidate, &[])
-            {
-                all.of.extend(vec![(candidate.effect.clone(), candidate.place); own.ncols()]);
-                all.columns = joined(all.columns, &(own * GIVE_WAY));
-            }
-        }
-        all
+    /// With one more, as its columns are at the size that is usual for it.
+    pub fn and(mut self, candidate: &Candidate, columns: &DMatrix<f64>) -> Self {
+        self.of.extend(vec![(candidate.effect.clone(), candidate.place); columns.ncols()]);
+        self.columns = joined(self.columns, &(columns * GIVE_WAY));
+        self
     }
 
     /// Whether a name stands for one.

@@ -74,7 +74,7 @@ impl Case<'_> {
         let runs = noise::runs(&linear);
         let mut coarse = Coarse::new(&linear, &candidates);
         let drives_of = |linear: &Linear, coarse: &Coarse| match in_motion {
-            true => Drives::new(linear, coarse, plain, library),
+            true => drives(linear, coarse, plain, library),
             false => Drives::none(linear.residual.len()),
         };
         let mut give_way = drives_of(&linear, &coarse);
@@ -185,6 +185,20 @@ impl Case<'_> {
             (noise, round) = (judged, round + 1);
         }
     }
+}
+
+/// How drives give way by the families with `of_every_drive`, at all joints of what follows a path.
+fn drives(linear: &Linear, coarse: &Coarse, candidates: &[Candidate], library: &Library) -> Drives {
+    let count = linear.residual.len();
+    let none = Drives::none(count);
+    let rows = Rows::new(linear, &none, coarse, Whitener::new(count, &[], &[], vec![false; count]));
+    let stand = |c: &&Candidate| library.families()[c.family].of_every_drive && c.parameters.is_empty();
+    candidates.iter().filter(stand).fold(Drives::none(count), |all, candidate| {
+        match rows.raw(candidate, &[]) {
+            Some(own) => all.and(candidate, &own),
+            None => all,
+        }
+    })
 }
 
 /// Of what the search found, the effects that foretell what was left out, where nothing is left to be gained by their parameters.

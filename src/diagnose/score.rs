@@ -15,6 +15,7 @@ use super::evidence::{log_mean_exp, rarity, sizes_up_to};
 use super::linear::Linear;
 use super::marginal::Marginal;
 use super::past::Pasts;
+use super::terms::joined;
 use super::whitener::Whitener;
 use crate::effects::{Candidate, Place};
 use crate::lie::Twist;
@@ -51,14 +52,6 @@ pub(super) struct Field {
     pub(super) dual: OnceLock<Vec<f64>>,
     /// What all effects of a history at a joint have, by their directions.
     pub(super) pasts: Mutex<Pasts>,
-}
-
-/// Columns behind others of the same rows.
-pub(super) fn joined(first: DMatrix<f64>, second: &DMatrix<f64>) -> DMatrix<f64> {
-    let at = first.ncols();
-    let mut all = first.insert_columns(at, second.ncols(), 0.0);
-    all.columns_mut(at, second.ncols()).copy_from(second);
-    all
 }
 
 impl<'a> Rows<'a> {

@@ -72,6 +72,14 @@ pub(super) fn side_by_side(parts: &[&DMatrix<f64>], rows: usize) -> DMatrix<f64>
     joined
 }
 
+/// Columns behind others of the same rows.
+pub(super) fn joined(first: DMatrix<f64>, second: &DMatrix<f64>) -> DMatrix<f64> {
+    let at = first.ncols();
+    let mut all = first.insert_columns(at, second.ncols(), 0.0);
+    all.columns_mut(at, second.ncols()).copy_from(second);
+    all
+}
+
 /// All effects but one.
 pub(super) fn all_but(in_model: &[ModelTerm], but: Option<usize>) -> Vec<ModelTerm> {
     in_model.iter().enumerate().filter(|(i, _)| Some(*i) != but).map(|(_, effect)| effect.clone()).collect()
