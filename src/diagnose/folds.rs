@@ -11,7 +11,7 @@ use super::noise::Noise;
 use super::policy::Rule;
 use super::rms::rms_of;
 use super::search::Search;
-use super::terms::ModelTerm;
+use super::terms::{ModelTerm, joined};
 use crate::feature::Samples;
 use crate::units::{ByQuantity, Quantity};
 
@@ -187,9 +187,7 @@ impl Normal {
         for (i, effect) in in_model.iter().enumerate() {
             let all = [&effect.columns, &effect.initial, &effect.discrepancy];
             for own in &all[..if with_discrepancies { 3 } else { 2 }] {
-                let at = white.ncols();
-                white = white.insert_columns(at, own.ncols(), 0.0);
-                white.columns_mut(at, own.ncols()).copy_from(own);
+                white = joined(white, own);
                 owner.extend(vec![Some(i); own.ncols()]);
             }
         }
@@ -344,9 +342,7 @@ impl Folds {
         let (rows, mut raw) = (search.rows, always);
         let mut part = vec![Part::Geometry; raw.ncols()];
         let mut put = |own: &DMatrix<f64>, of: Part| {
-            let at = raw.ncols();
-            raw = std::mem::take(&mut raw).insert_columns(at, own.ncols(), 0.0);
-            raw.columns_mut(at, own.ncols()).copy_from(own);
+            raw = joined(std::mem::take(&mut raw), own);
             part.extend(vec![of; own.ncols()]);
         };
         for (i, effect) in told.iter().enumerate() {

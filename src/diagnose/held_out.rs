@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::marginal::{square, with_prior};
 use super::search::Search;
-use super::terms::ModelTerm;
+use super::terms::{ModelTerm, joined};
 use crate::effects::{Candidate, Identified, Library};
 
 /// Constant deviations and effects solved together.
@@ -56,9 +56,7 @@ impl Model {
             let at = columns.ncols();
             offsets.push(at);
             for own in [&effect.columns, &effect.initial] {
-                let at = columns.ncols();
-                columns = columns.insert_columns(at, own.ncols(), 0.0);
-                columns.columns_mut(at, own.ncols()).copy_from(own);
+                columns = joined(columns, own);
             }
         }
         let toward = columns.tr_mul(&search.rows.residual);
@@ -159,9 +157,7 @@ impl Model {
             wide.set_column(at + s, &(column * *range));
         }
         for effect in in_model {
-            let at = wide.ncols();
-            wide = wide.insert_columns(at, effect.discrepancy.ncols(), 0.0);
-            wide.columns_mut(at, effect.discrepancy.ncols()).copy_from(&(&effect.discrepancy * discrepancy));
+            wide = joined(wide, &(&effect.discrepancy * discrepancy));
         }
         let Some(factor) = with_prior(square(&wide)) else { return Solved { coefficients, covariance } };
         let inverse = factor.inverse();

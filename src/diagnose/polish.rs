@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::equations::Score;
 use super::marginal::{Marginal, solved};
 use super::search::Search;
-use super::terms::{Hypothesis, ModelTerm};
+use super::terms::{Hypothesis, ModelTerm, joined};
 
 /// Times that all effects are looked at, where there are several; steps of each.
 const ROUNDS: usize = 2;
@@ -82,8 +82,7 @@ impl Search<'_> {
         if slopes.iter().any(|x| !x.is_finite()) {
             return None;
         }
-        let mut both = own.insert_columns(effect.columns.ncols(), free.len(), 0.0);
-        both.columns_mut(effect.columns.ncols(), free.len()).copy_from(&slopes);
+        let both = joined(own, &slopes);
         let solution = self.solved_beside(&both, marginal)?;
         let mut to = from.parameters.clone();
         for ((p, range), step) in free.iter().zip(solution.rows_range(effect.columns.ncols()..).iter()) {

@@ -7,7 +7,7 @@ use super::marginal::gram;
 use super::placebo::Placebo;
 use super::rms::rms_of_rows;
 use super::search::Search;
-use super::terms::ModelTerm;
+use super::terms::{ModelTerm, joined};
 use crate::units::{ByQuantity, Quantity};
 
 /// Fewer samples of a set-up do not say where the machine stands.
@@ -107,9 +107,7 @@ impl SetUps {
         let linear = search.rows.linear;
         let mut raw = search.rows.always(|_, _| false);
         for own in effects {
-            let at = raw.ncols();
-            raw = raw.insert_columns(at, own.ncols(), 0.0);
-            raw.columns_mut(at, own.ncols()).copy_from(own);
+            raw = joined(raw, own);
         }
         let mut of_row = vec![0; raw.nrows()];
         for span in &linear.spans {
