@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::folder::AS_IS;
 use super::verdict::{CaseFiles, Finding};
 
 /// A concealed effect.
@@ -118,12 +119,16 @@ pub fn open(folder: &Path, machines: &Path) -> Result<Vec<(CaseFiles, Answer)>, 
         let mut recordings: Vec<_> = entries.flatten().map(|e| e.path()).collect();
         recordings.retain(|p| p.extension().is_some_and(|e| e == "csv"));
         recordings.sort();
-        let judge = folder.join("judge").join(format!("{}.csv", answer.label));
+        let path = |name: &str| {
+            let file = folder.join(name).join(format!("{}.csv", answer.label));
+            file.exists().then_some(file)
+        };
         let files = CaseFiles {
             label: answer.label.clone(),
             machine: machines.join(format!("{}.ron", answer.machine)),
             recordings,
-            judge: judge.exists().then_some(judge),
+            judge: path("judge"),
+            judge_as_is: path(AS_IS),
         };
         all.push((files, answer));
     }

@@ -250,12 +250,10 @@ impl Case {
         errors
     }
 
-    /// What the instrument reads on run `run`, per sample; a pose as position and rotation.
-    pub fn readings(&self, run: usize, random: Option<&mut Random>) -> Vec<Reading> {
+    /// What the instrument reads on run `run`, per sample; a pose as position and rotation. `with_effects`: what is concealed acts.
+    pub fn readings(&self, run: usize, with_effects: bool, random: Option<&mut Random>) -> Vec<Reading> {
         let track = &self.world.track;
         let samples = track.starts[run]..track.starts[run + 1];
-        let judged = run + 2 == track.starts.len();
-        let with_effects = !(judged && self.mode == Mode::Odd);
         let mut all: Vec<Reading> = samples
             .clone()
             .map(|k| {

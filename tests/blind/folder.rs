@@ -1,4 +1,5 @@
-//! Cases as files: `case_NNN/rec_K.csv`, `judge/case_NNN.csv`, `answers.json`.
+//! Cases as files: `case_NNN/rec_K.csv`, `judge/case_NNN.csv`, `answers.json`, and `judge_as_is/case_NNN.csv` where what is concealed is
+//! outside every vocabulary: there `judge` has a machine that is rid of it.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,9 +7,12 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::body::Rigid;
-use super::case::{Case, Concealed};
+use super::case::{Case, Concealed, Mode};
 use super::effect::{Place, Profile};
 use super::world::Instrument;
+
+/// The judge's paths of machines that still have what is outside every vocabulary.
+pub const AS_IS: &str = "judge_as_is";
 
 impl Case {
     pub fn label(&self) -> String {
@@ -22,16 +26,21 @@ impl Case {
     pub fn write(&self, folder: &Path) -> std::io::Result<Value> {
         let own = folder.join(self.label());
         std::fs::create_dir_all(&own)?;
-        std::fs::create_dir_all(folder.join("judge"))?;
         let mut random = self.random.clone();
         let recorded = self.world.runs.len() - 1;
         for run in 0..recorded {
-            let readings = self.readings(run, Some(&mut random));
+            let readings = self.readings(run, true, Some(&mut random));
             std::fs::write(own.join(format!("rec_{}.csv", run + 1)), self.csv(run, &readings, 5))?;
         }
-        let judged = self.readings(recorded, None);
-        let text = self.csv(recorded, &judged, 7);
-        std::fs::write(folder.join("judge").join(format!("{}.csv", self.label())), text)?;
+        let is_odd = self.mode == Mode::Odd;
+        for (name, with_effects) in
+            [("judge", !is_odd), (AS_IS, true)].into_iter().take(1 + usize::from(is_odd))
+        {
+            let own = folder.join(name);
+            std::fs::create_dir_all(&own)?;
+            let judged = self.csv(recorded, &self.readings(recorded, with_effects, None), 7);
+            std::fs::write(own.join(format!("{}.csv", self.label())), judged)?;
+        }
         Ok(self.answer())
     }
 

@@ -60,6 +60,8 @@ pub struct Score {
     pub findings: usize,
     pub names: usize,
     pub judged_worse: Count,
+    /// The same where the machine is rid of what is outside every vocabulary.
+    pub rid_worse: Count,
     pub judge_ratios: Vec<f64>,
     pub held_out_ratios: Vec<f64>,
     pub sizes_covered: Count,
@@ -144,8 +146,12 @@ impl Score {
                 self.cover(truth, findings[*i]);
             }
         }
+        let is_worse = |(plain, diagnosed): (f64, f64)| diagnosed > 1.1 * plain;
+        if let Some(errors) = verdict.rid {
+            self.rid_worse.add(is_worse(errors));
+        }
         if let Some((plain, diagnosed)) = verdict.judged {
-            let worse = diagnosed > 1.1 * plain;
+            let worse = is_worse((plain, diagnosed));
             self.judged_worse.add(worse);
             failed |= worse;
             self.judge_ratios.push(diagnosed / plain);

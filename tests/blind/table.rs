@@ -89,6 +89,11 @@ pub fn rows(score: &Score, kind: Kind) -> Vec<(String, String, String)> {
             percent(score.judged_worse),
         ),
         (
+            "outside every vocabulary, on the path of a machine that is rid of it: worse by > 10 %".into(),
+            String::new(),
+            percent(score.rid_worse),
+        ),
+        (
             "the same error, ratio to that of plain calibration, median".into(),
             String::new(),
             number(median(&score.judge_ratios), 3),

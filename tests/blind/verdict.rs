@@ -16,8 +16,10 @@ pub struct CaseFiles {
     pub label: String,
     pub machine: PathBuf,
     pub recordings: Vec<PathBuf>,
-    /// The noise-free path that nobody fits.
+    /// The noise-free path that nobody fits; of a machine rid of what is outside every vocabulary.
     pub judge: Option<PathBuf>,
+    /// The same path of the machine as it was recorded, where that is another.
+    pub judge_as_is: Option<PathBuf>,
 }
 
 /// One named effect.
@@ -40,8 +42,10 @@ pub struct Verdict {
     pub shape_share: Option<f64>,
     /// RMS on data not used for the fit, with everything found modelled, m or rad.
     pub held_out: Option<f64>,
-    /// RMS error on the judge's path: plain calibration, diagnosed model.
+    /// RMS error on the judge's path, of the machine as it was recorded: plain calibration, diagnosed model.
     pub judged: Option<(f64, f64)>,
+    /// The same where it is rid of what is outside every vocabulary.
+    pub rid: Option<(f64, f64)>,
     pub seconds: f64,
     pub samples: f64,
     /// Rules that were asked, where that is told.
@@ -208,7 +212,12 @@ impl Diagnoser for Engine {
             case.recordings.iter().for_each(|r| arguments.push(r));
             arguments.extend([&"-o" as &dyn AsRef<std::ffi::OsStr>, &plain]);
             self.call(&arguments)?;
-            verdict.judged = Some((self.predicted(&plain, judge)?, self.predicted(&model, judge)?));
+            let errors =
+                |path: &Path| Ok::<_, String>((self.predicted(&plain, path)?, self.predicted(&model, path)?));
+            verdict.judged = Some(errors(judge)?);
+            if let Some(as_is) = &case.judge_as_is {
+                verdict.rid = verdict.judged.replace(errors(as_is)?);
+            }
         }
         let _ = std::fs::remove_dir_all(&own);
         Ok(verdict)
@@ -240,6 +249,7 @@ impl Verdict {
             shape_share: json["shape_share"].as_f64(),
             held_out: held.iter().find_map(|h| json[*h]["final"].as_f64()),
             judged: None,
+            rid: None,
             seconds: 0.0,
             samples: json["samples"].as_f64().unwrap_or(0.0),
             asked: Vec::new(),

@@ -13,6 +13,7 @@ use kincal::recording::Recording;
 
 use crate::harness::answer;
 use crate::harness::case::{Case, Kind, Mode, draw};
+use crate::harness::effect::Place;
 use crate::harness::score::{Count, Score};
 use crate::harness::verdict::{Engine, Finding, Verdict};
 use crate::harness::world::Instrument;
@@ -97,11 +98,30 @@ fn a_concealed_effect_stands_above_the_noise_as_its_ratio_says() {
 fn the_judges_path_is_noise_free_and_later_on_the_same_clock() {
     let case = draw(&harness::machines(), Kind::Standard, Some(Mode::One), 7, 0);
     let last = case.world.runs.len() - 1;
-    let a = case.readings(last, None);
-    let b = case.readings(last, None);
+    let a = case.readings(last, true, None);
+    let b = case.readings(last, true, None);
     assert!(a.iter().zip(&b).all(|(a, b)| a.parts == b.parts));
     let end = case.world.runs[last - 1].time.last().copied().expect("samples");
     assert!(case.world.runs[last].time[0] > end + 20.0);
+}
+
+#[test]
+fn what_is_outside_every_vocabulary_is_on_one_of_two_judges_paths() {
+    let (folder, machines) = (folder("as_is"), harness::machines());
+    let is_of_machine = |case: &Case| !matches!(case.concealed[0].effect.place, Place::Measurement);
+    let odd =
+        (0..).map(|number| draw(&machines, Kind::Standard, Some(Mode::Odd), 8, number)).find(is_of_machine);
+    let odd = odd.expect("one of many");
+    let known = draw(&machines, Kind::Standard, Some(Mode::One), 8, odd.number + 1);
+    let answers = [&odd, &known].map(|case| case.write(&folder).expect("written"));
+    std::fs::write(folder.join("answers.json"), serde_json::to_string(&answers).expect("JSON"))
+        .expect("written");
+    let cases = answer::open(&folder, &harness::machine_folder()).expect("readable");
+    let [odd, known] = cases.as_slice() else { panic!("two cases") };
+    let text =
+        |path: &Option<PathBuf>| std::fs::read_to_string(path.as_ref().expect("written")).expect("text");
+    assert_ne!(text(&odd.0.judge), text(&odd.0.judge_as_is));
+    assert_eq!(known.0.judge_as_is, None);
 }
 
 #[test]
