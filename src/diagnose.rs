@@ -82,7 +82,7 @@ pub use diagnosis::{
     Diagnosis, HeldOutRms, LeftOutRms, Outliers, RmsByModel, SaidBy, SetUpLeftOut, SharedEffect, StandsStill,
     Thinned, WithoutOutliers,
 };
-pub use finding::{Confusable, Finding, HeldOutPair, Meaningless, Size, Where};
+pub use finding::{AlsoAt, Confusable, Finding, HeldOutPair, Meaningless, Size, Where};
 pub use nameless::{Gathering, LikelyName, Proposal, Unexplained, UnnamedPart};
 pub use not_tried::NotTried;
 pub use side_branches::UnseenSideBranch;

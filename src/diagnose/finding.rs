@@ -27,7 +27,7 @@ pub struct Finding {
     pub remedy: String,
     /// Its sizes.
     pub coefficients: Vec<Size>,
-    /// Probability that name and place are right.
+    /// Probability that name and place are right, the place or one of `also_at`.
     pub probability: f64,
     /// Half of it is the logarithm of the evidence for it.
     pub delta_bic: f64,
@@ -39,6 +39,9 @@ pub struct Finding {
     /// What a cause that cannot be one does as well.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placebo: Option<Meaningless>,
+    /// Other places at which the same effect would do what these recordings show, just as well; not written where there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_at: Vec<AlsoAt>,
     /// What these recordings cannot tell from it.
     pub confusable_with: Vec<Confusable>,
     /// Part of the mean square that geometry leaves over that goes with it, 0 to 1, the others taken in.
@@ -90,6 +93,16 @@ impl Finding {
             self.confusable_with.iter_mut().for_each(|other| other.probability *= left / others);
         }
     }
+}
+
+/// Another place for the same.
+#[non_exhaustive]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct AlsoAt {
+    /// Place.
+    pub at: String,
+    /// The motion that would tell them apart.
+    pub separate_by: String,
 }
 
 /// Another name for the same.

@@ -2,10 +2,10 @@
 
 use super::diagnosis::Named;
 use super::evidence::log_sum_exp;
-use super::finding::{Confusable, Finding, Size};
+use super::finding::{AlsoAt, Confusable, Finding, Size};
 use super::held_out::Model;
 use super::names::{GivenName, Naming};
-use super::odds::{LISTED, Odds, confusable, odds, trust};
+use super::odds::{LISTED, Odds, confusable, is_same_elsewhere, odds, trust};
 use super::placebo::Placebo;
 use super::policy::Rule;
 use super::search::Search;
@@ -47,7 +47,7 @@ pub(super) fn promoted(
     let all: Vec<ModelTerm> = named.chain(others.iter().cloned()).collect();
     let model = Model::new(search, &all);
     let (finding, named) = finding(search, &all, k, shares, (machine, library), &model)?;
-    let mut finding = Finding { probability: *probability, ..finding };
+    let mut finding = Finding { probability: *probability, also_at: Vec::new(), ..finding };
     // What else it may be there has been asked together with its name.
     let names = naming.likely(group);
     finding.confusable_with.retain_mut(|other| {
@@ -110,9 +110,11 @@ pub(super) fn finding(
     let hypotheses = instead(search, in_model, &own, left.overdispersion, hypotheses);
     let is_plain = search.commonness[own.candidate] == 0.0 && shares.discrepancies < PLAIN * total;
     let odds = odds(search, &hypotheses, &own, left.overdispersion.max(search.overdispersion), is_plain);
-    let is_own = |o: &&Odds| search.is_form(o.hypothesis.candidate, own.candidate);
+    let is_same =
+        |o: &Odds| o.is_listed && is_same_elsewhere(search, &own, o.hypothesis, left.overdispersion);
+    let is_own = |o: &&Odds| search.is_form(o.hypothesis.candidate, own.candidate) || is_same(o);
     let own_odds: f64 = odds.iter().filter(is_own).map(|o| o.probability).sum();
-    let probability = own_odds.min(1.0) * trust(shares.discrepancies / total, 2.0 * own.weight);
+    let probability = own_odds.min(1.0) * trust(2.0 * own.weight);
     let candidate = &search.candidates[effect.candidate];
     let family = &library.families()[candidate.family];
     let mut solved = model.effect(search, in_model, i, shares.departure());
@@ -127,9 +129,15 @@ pub(super) fn finding(
     let identified = solved.identified(candidate, library, parameters);
     let sizes = identified.sizes(&search.rows.linear.samples);
     let named = Named { effect: identified.stored(machine, &sizes), scales: effect.scales(search) };
-    let mut confusable_with: Vec<Confusable> = Vec::new();
+    let (mut confusable_with, mut also_at): (Vec<Confusable>, Vec<AlsoAt>) = (Vec::new(), Vec::new());
     for o in odds.iter().filter(|o| o.is_listed) {
         let other = confusable(o, search, machine, family);
+        if is_same(o) {
+            if also_at.iter().all(|known| known.at != other.at) {
+                also_at.push(AlsoAt { at: other.at, separate_by: other.separate_by });
+            }
+            continue;
+        }
         match confusable_with.iter_mut().find(|c| (&c.effect, &c.at) == (&other.effect, &other.at)) {
             Some(known) => known.probability += other.probability,
             None => confusable_with.push(other),
@@ -156,6 +164,7 @@ pub(super) fn finding(
         held_out_rms: ByQuantity::default(),
         r#where: wheres(search, &|row| effect.columns.row(row).norm_squared()),
         placebo: None,
+        also_at,
         confusable_with,
         share: 0.0,
     };

@@ -237,9 +237,8 @@ impl Verdict {
                 .iter()
                 .filter_map(|c| Some((text(&c["name"]), c["value"].as_f64()?, c["std_error"].as_f64()?)))
                 .collect(),
-            confusable: list(&f["confusable_with"])
-                .iter()
-                .map(|c| (text(&c["effect"]), text(&c["at"])))
+            confusable: (list(&f["also_at"]).iter().map(|c| (text(&f["effect"]), text(&c["at"]))))
+                .chain(list(&f["confusable_with"]).iter().map(|c| (text(&c["effect"]), text(&c["at"]))))
                 .collect(),
         };
         let held = ["held_out_rms_m", "held_out_rms_rad"];

@@ -84,3 +84,31 @@ fn a_sample_that_is_off_beside_an_effect_is_told_as_such() {
     let lines: Vec<u64> = said.outliers.iter().flat_map(|o| o.lines.clone()).collect();
     assert_eq!(lines, [54]);
 }
+
+/// Workpiece and tool of a mill that does not turn them: a bar between the two cannot tell which of them has jumped.
+#[test]
+fn a_slip_that_may_be_of_either_frame_is_told_at_both() {
+    let machine = common::machine("xyz_mill");
+    let mut noise = normals(8);
+    let mut text =
+        String::from("# measurement: distance\n# nominal_length[mm]: 100\nt[s],x[mm],y[mm],z[mm],d[mm]\n");
+    for k in 0..1500 {
+        let t = 0.1 * f64::from(k);
+        let (turn, rise) = (0.3 * t, 0.9 * (0.11 * t).sin());
+        let q = [turn.cos() * rise.cos(), turn.sin() * rise.cos(), rise.sin()].map(|q| 100.0 * q);
+        let jump = if k < 800 { [0.0; 3] } else { [0.02, -0.012, 0.009] };
+        let length = (0..3).map(|i| (q[i] + jump[i]).powi(2)).sum::<f64>().sqrt() + 1e-3 * noise();
+        text += &format!("{t:.1},{:.5},{:.5},{:.5},{:.5}\n", q[0], q[1], q[2], length - 100.0);
+    }
+    let recording = Recording::from_bytes("c.csv", text.into_bytes(), &machine).expect("a recording");
+    let options = DiagnoseOptions::default();
+    let said = diagnose(&machine, &[recording], &Library::standard(), &options, &|_| {});
+    let said = said.unwrap_or_else(|e| panic!("{e}"));
+    let [slip] = said.findings.as_slice() else { panic!("{:?}", names(&said)) };
+    assert_eq!(slip.effect, "setup_slip");
+    let places = [slip.at.as_str(), slip.also_at.first().map_or("", |other| other.at.as_str())];
+    assert!(places.contains(&"w") && places.contains(&"t"), "{places:?}");
+    assert!(slip.probability > 0.9, "{}", slip.probability);
+    let others: f64 = slip.confusable_with.iter().map(|other| other.probability).sum();
+    assert!(slip.probability + others <= 1.0 + 1e-12);
+}

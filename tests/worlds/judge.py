@@ -45,6 +45,11 @@ def names(finding):
     return [finding["effect"]] + ([f"{finding['effect']} ({form})", form] if form else [])
 
 
+def others(finding):
+    """What else a finding may be, and where else."""
+    return finding["confusable_with"] + [{"effect": finding["effect"], "at": other["at"]} for other in finding.get("also_at", [])]
+
+
 def answered(folder, out):
     """Answers, those of other simulators with what they leave out."""
     for a in json.loads((folder / "answers.json").read_text()):
@@ -99,7 +104,7 @@ def score(answer, told, plain, diagnosed):
         "place": bool(first) and share.get(at, 0) >= CARRIES,
         "named": bool(findings) and any(n in right for n in names(findings[0])),
         "among": bool(findings) and any(n in right for n in names(findings[0])) or any(
-            c["at"] in kinds and c["effect"] in RIGHT[kinds[c["at"]]] for c in (findings[0]["confusable_with"] if findings else [])),
+            c["at"] in kinds and c["effect"] in RIGHT[kinds[c["at"]]] for c in (others(findings[0]) if findings else [])),
         "silent": not findings,
         "wrong": [f"{f['effect']} {f['at']}" for f in sure if abs(share.get(f["at"], 0)) < IDLE and not of_loop(f)],
         "amiss": [f"{f['effect']} {f['at']}" for f in sure if abs(share.get(f["at"], 0)) >= IDLE and not of_loop(f) and not describes(f)],

@@ -19,7 +19,7 @@ pub(super) struct Action {
 /// What to do about a finding.
 pub(super) fn of_finding(finding: &Finding) -> String {
     let doubt: f64 = finding.confusable_with.iter().map(|other| other.probability).sum();
-    let first = tests(finding).into_iter().next().filter(|_| doubt > DOUBTED);
+    let first = tests(finding).into_iter().next().filter(|_| doubt > DOUBTED || !finding.also_at.is_empty());
     let remedy = match finding.remedy.as_str() {
         "" => "let `kincal compensate` correct it with the file of -o".to_string(),
         remedy => remedy.to_string(),

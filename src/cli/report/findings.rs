@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::plot::{Ink, Layer, Marks, Plot, envelope, thinned};
 use super::table::{Cell, largest, number, percent, residual_unit, table, word, written};
-use super::text::{about, about_unexplained, amount, beside, calm, figures, probability, tests};
+use super::text::{about, about_unexplained, amount, beside, calm, figures, places_of, probability, tests};
 use crate::cli::output::Kind;
 use crate::diagnose::{Along, Curve, CurvePoint, Diagnosis, Finding, Size};
 use crate::effects::in_words;
@@ -94,7 +94,7 @@ fn table_of(findings: &[Finding]) -> Markup {
         vec![
             written((i + 1).to_string(), i as f64),
             word(finding.name()),
-            word(&finding.at),
+            word(places_of(finding)),
             word(sizes(finding).join("; ")),
             written(probability(finding.probability), finding.probability),
             percent(finding.share),

@@ -1,6 +1,6 @@
 //! The verdict in one or two sentences: how far the machine is off, what of it geometry and what was named take away.
 
-use super::text::amount;
+use super::text::{amount, places_of};
 use crate::cli::output::{count, length};
 use crate::compensate;
 use crate::diagnose::{Diagnosis, Finding};
@@ -43,7 +43,7 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis) -> String {
         let is_alone = diagnosis.findings.iter().filter(is_like).count() == 1;
         let form = finding.form.as_ref().filter(|_| !is_alone);
         let effect = form.unwrap_or(&finding.effect).replace('_', " ");
-        let at = if finding.at == "measurement" { "the measurement" } else { &finding.at };
+        let at = if finding.at == "measurement" { "the measurement".into() } else { places_of(finding) };
         let name = format!("{effect} of {at}");
         if !names.contains(&name) {
             names.push(name);

@@ -189,10 +189,15 @@ pub(super) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
     let mut lines = vec![format!(
         "{} at {}, probability {}; it explains {} of what geometry left over",
         finding.name(),
-        finding.at,
+        places_of(finding),
         probability(finding.probability),
         percent(finding.share)
     )];
+    if !finding.also_at.is_empty() {
+        lines.push(
+            "these recordings do not tell at which of these places; the model has it at the first".into(),
+        );
+    }
     for (HeldOutPair { before, after }, angle) in both(finding.held_out_rms.m, finding.held_out_rms.rad) {
         lines.push(format!(
             "held-out error: {} without it -> {} with it",
@@ -225,19 +230,33 @@ pub(super) fn about(diagnosis: &Diagnosis, finding: &Finding) -> Vec<String> {
 
 /// Which measurements would tell a finding from its rivals, each with the rivals that it tells apart.
 pub(super) fn tests(finding: &Finding) -> Vec<(&str, Vec<String>)> {
-    let mut tests: Vec<(&str, Vec<String>)> = Vec::new();
-    for other in &finding.confusable_with {
+    let elsewhere = finding.also_at.iter().map(|other| {
+        let name = format!("{} at {}", finding.effect, other.at);
+        (other.separate_by.as_str(), name)
+    });
+    let instead = finding.confusable_with.iter().map(|other| {
         let name = if other.at == finding.at {
             other.effect.clone()
         } else {
             format!("{} at {}", other.effect, other.at)
         };
-        match tests.iter_mut().find(|(test, _)| *test == other.separate_by) {
+        (other.separate_by.as_str(), name)
+    });
+    let mut tests: Vec<(&str, Vec<String>)> = Vec::new();
+    for (test, name) in elsewhere.chain(instead) {
+        match tests.iter_mut().find(|(known, _)| *known == test) {
             Some((_, names)) => names.push(name),
-            None => tests.push((&other.separate_by, vec![name])),
+            None => tests.push((test, vec![name])),
         }
     }
     tests
+}
+
+/// Where a finding is: `w or x` where the recordings do not tell them apart.
+pub(super) fn places_of(finding: &Finding) -> String {
+    let places =
+        [finding.at.as_str()].into_iter().chain(finding.also_at.iter().map(|other| other.at.as_str()));
+    places.collect::<Vec<_>>().join(" or ")
 }
 
 /// What there is to say of a structure without a name.
