@@ -85,9 +85,9 @@ pub(super) fn report(
         .filter(|((i, ..), placebo)| is_outdone(placebo) || says_no_more(search, in_model, *i))
         .map(|((i, ..), _)| place(i))
         .collect();
-    // Along a path, it is likelier than not that one of the names that are told is right.
+    // It is likelier than not that what is told is right, or what it may be instead.
     let holds = |(i, finding, _): &(usize, Finding, Named)| {
-        !empty.contains(&place(i)) && (!search.in_motion || finding.probability_of_all() > LIKELY)
+        !empty.contains(&place(i)) && finding.probability_of_all() > LIKELY
     };
     if !told.iter().all(holds) {
         let unlikely = told.iter().filter(|told| !holds(told));

@@ -114,7 +114,8 @@ pub(super) fn finding(
         |o: &Odds| o.is_listed && is_same_elsewhere(search, &own, o.hypothesis, left.overdispersion);
     let is_own = |o: &&Odds| search.is_form(o.hypothesis.candidate, own.candidate) || is_same(o);
     let own_odds: f64 = odds.iter().filter(is_own).map(|o| o.probability).sum();
-    let probability = own_odds.min(1.0) * trust(2.0 * own.weight);
+    let trusted = trust(2.0 * own.weight);
+    let probability = own_odds.min(1.0) * trusted;
     let candidate = &search.candidates[effect.candidate];
     let family = &library.families()[candidate.family];
     let mut solved = model.effect(search, in_model, i, shares.departure());
@@ -131,7 +132,8 @@ pub(super) fn finding(
     let named = Named { effect: identified.stored(machine, &sizes), scales: effect.scales(search) };
     let (mut confusable_with, mut also_at): (Vec<Confusable>, Vec<AlsoAt>) = (Vec::new(), Vec::new());
     for o in odds.iter().filter(|o| o.is_listed) {
-        let other = confusable(o, search, machine, family);
+        let other =
+            Confusable { probability: o.probability * trusted, ..confusable(o, search, machine, family) };
         if is_same(o) {
             if also_at.iter().all(|known| known.at != other.at) {
                 also_at.push(AlsoAt { at: other.at, separate_by: other.separate_by });
