@@ -184,7 +184,7 @@ fn put(file: &Path, [open, close]: [&str; 2], tables: &str) -> Result<(), String
         (Some((before, _)), Some((_, after))) => (before.to_string(), after.to_string()),
         _ => (format!("{old}\n"), "\n".to_string()),
     };
-    let text = format!("{before}{open}\n\n{tables}\n{close}{after}");
+    let text = format!("{before}{open}\n\n{}\n{close}{after}", tables.trim_end());
     std::fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))
 }
 

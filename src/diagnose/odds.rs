@@ -17,7 +17,10 @@ const SHIFT: f64 = 0.002;
 const ALIKE: f64 = 0.12;
 /// But no names that are so much rarer, as a logarithm.
 const RARER: f64 = 1.2;
-/// Trust in names falls by half where the evidence is no more than this.
+/// Trust in names falls where shapes take up more than this part of the structure, to this at least, and by half where the evidence is
+/// no more than this.
+const ODDER: f64 = 0.12;
+const LEAST: f64 = 0.55;
 const SLIGHT: f64 = 30.0;
 /// Places between which the logarithm of the likelihood differs by less, as one standard deviation makes it, are not told apart.
 const SAME: f64 = 0.5;
@@ -29,10 +32,11 @@ pub(super) struct Odds<'a> {
     /// Whether it is told beside the best one.
     pub is_listed: bool,
 }
-/// How often a name is right that evidence alone makes certain, on cases whose answers are known: less where the evidence (`bic`, twice
-/// its logarithm) is slight.
-pub(super) fn trust(bic: f64) -> f64 {
-    1.0 / (1.0 + (SLIGHT / bic.max(1e-9)).powi(2))
+/// How often a name is right that evidence alone makes certain, on cases whose answers are known: less where shapes take up much
+/// (`discrepancy`, a part of the structure), and where the evidence (`bic`, twice its logarithm) is slight.
+pub(super) fn trust(discrepancy: f64, bic: f64) -> f64 {
+    let (odd, slight) = ((discrepancy / ODDER).powi(3), (SLIGHT / bic.max(1e-9)).powi(2));
+    (LEAST + (1.0 - LEAST) / (1.0 + odd)) / (1.0 + slight)
 }
 
 /// Whether it is the same effect at another place, and the readings say no more for the one than for the other.

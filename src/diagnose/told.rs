@@ -114,7 +114,7 @@ pub(super) fn finding(
         |o: &Odds| o.is_listed && is_same_elsewhere(search, &own, o.hypothesis, left.overdispersion);
     let is_own = |o: &&Odds| search.is_form(o.hypothesis.candidate, own.candidate) || is_same(o);
     let own_odds: f64 = odds.iter().filter(is_own).map(|o| o.probability).sum();
-    let trusted = trust(2.0 * own.weight);
+    let trusted = trust(shares.discrepancies / total, 2.0 * own.weight);
     let probability = own_odds.min(1.0) * trusted;
     let candidate = &search.candidates[effect.candidate];
     let family = &library.families()[candidate.family];
