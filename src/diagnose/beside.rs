@@ -183,9 +183,6 @@ mod tests {
         let others = all.others();
         let of_shape = with_initial.worth(&shape, &with_initial.apply(&residual), 1.5);
         assert!((others.worth(1.5) - of_shape).abs() < 1e-9);
-        let half = &shape * 0.5;
-        let of_half = with_initial.worth(&half, &with_initial.apply(&residual), 1.5);
-        assert!((all.others().with_first(0.5).worth(1.5) - of_half).abs() < 1e-9);
         let Equations { gram, toward, .. } = others.others().last();
         let along = with_both.along(&own.as_view());
         assert!((gram - (own.tr_mul(&own) - along.tr_mul(&along))).amax() < 1e-9);
