@@ -120,17 +120,6 @@ impl Beside {
         worth_of(gram, &self.toward.rows(0, self.count()).into_owned(), overdispersion)
     }
 
-    /// The same where the standard deviations of the first set are so many times as large.
-    pub fn with_first(mut self, times: f64) -> Self {
-        let count = self.count();
-        for of in [&mut self.own, &mut self.gram] {
-            of.rows_mut(0, count).scale_mut(times);
-            of.columns_mut(0, count).scale_mut(times);
-        }
-        self.toward.rows_mut(0, count).scale_mut(times);
-        self
-    }
-
     /// The other sets beside the marginal with the first one: `B = (I + G₁₁)⁻¹ G₁₂` goes from `G₂₂` as `G₂₁ B`, and from what leads to the
     /// residuals as `Bᵀ g₁`.
     pub fn others(&self) -> Self {

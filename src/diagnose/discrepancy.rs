@@ -44,15 +44,6 @@ const BEGINNINGS: usize = 64;
 /// Effects with more directions keep the mixture of them that was found.
 pub(super) const MOST_DIRECTIONS: usize = 3;
 
-/// How large curves of higher orders may be.
-#[derive(Clone, Copy)]
-pub(super) enum Orders {
-    /// As large as those of the first.
-    Alike,
-    /// That over their order, as smooth functions have them.
-    Fade,
-}
-
 /// Columns of the shape of an effect, each times what its coefficient may be; `answers`: to its motion. `with_sides`: with those that every effect
 /// of the same history has, [`past_curves`].
 pub(super) fn shape(
@@ -61,16 +52,9 @@ pub(super) fn shape(
     in_model: &ModelTerm,
     answers: Vec<Column>,
     with_sides: bool,
-    orders: Orders,
 ) -> Unmixed {
     let curves = curves(rows, candidate, &in_model.score.parameters, with_sides);
-    let (curves, order): (Vec<Column>, Vec<f64>) =
-        curves.into_iter().map(|(curve, order)| (Arc::new(curve), order)).unzip();
-    let most = PART * amplitude(in_model);
-    whitened(rows, answers, curves, |curve| match orders {
-        Orders::Alike => most,
-        Orders::Fade => most / order[curve],
-    })
+    whitened(rows, answers, curves.into_iter().map(Arc::new).collect(), PART * amplitude(in_model))
 }
 
 /// Columns of what an effect with a memory may have been before anybody looked: until its joint first turns round in a
@@ -87,7 +71,7 @@ pub(super) fn initial_conditions(
     let before = |of: (usize, bool)| known(of).unwrap_or_else(|| beginnings(rows.linear, of.0, of.1));
     let mut curves: Vec<Column> = pasts.flat_map(before).collect();
     curves.extend(turns(rows, candidate, &in_model.score.parameters));
-    whitened(rows, answers, curves, |_| amplitude(in_model))
+    whitened(rows, answers, curves, amplitude(in_model))
 }
 
 /// The same without those columns that every effect of the same history has, [`past_curves`].
@@ -97,7 +81,7 @@ pub(super) fn own_initial_conditions(
     in_model: &ModelTerm,
     answers: Vec<Column>,
 ) -> Unmixed {
-    whitened(rows, answers, turns(rows, candidate, &in_model.score.parameters), |_| amplitude(in_model))
+    whitened(rows, answers, turns(rows, candidate, &in_model.score.parameters), amplitude(in_model))
 }
 
 /// The joint of an effect that depends on that joint alone and on which way it has come, whether that lasts, and how many of its features do so
@@ -264,12 +248,7 @@ impl Columns {
 }
 
 /// Columns of answers times curves, each of this norm.
-pub(super) fn whitened(
-    rows: &Rows,
-    answers: Vec<Column>,
-    curves: Vec<Column>,
-    amplitude: impl Fn(usize) -> f64 + Sync,
-) -> Unmixed {
+pub(super) fn whitened(rows: &Rows, answers: Vec<Column>, curves: Vec<Column>, amplitude: f64) -> Unmixed {
     let n = rows.residual.len();
     let mut made_of: Vec<(usize, usize, f64)> =
         (0..answers.len()).flat_map(|a| (0..curves.len()).map(move |c| (a, c, 0.0))).collect();
@@ -294,10 +273,10 @@ pub(super) fn whitened(
             }
             rows.whitener.apply_few(plain, white);
             let both = plain.chunks(n.max(1)).zip(white.chunks_mut(n.max(1)));
-            for ((plain, white), (_, curve, scale)) in both.zip(made_of) {
+            for ((plain, white), (.., scale)) in both.zip(made_of) {
                 // Rows that are left out have their part in how long it may be.
                 let length = (squares(white) / rows.whitener.part_in_use(plain)).sqrt();
-                *scale = if length > 0.0 && length.is_finite() { amplitude(*curve) / length } else { 0.0 };
+                *scale = if length > 0.0 && length.is_finite() { amplitude / length } else { 0.0 };
                 white.iter_mut().for_each(|x| *x *= *scale);
             }
         },
@@ -417,16 +396,9 @@ pub(super) fn each_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTe
 
 /// The same, or of many directions to the mixture of them that was found.
 pub(super) fn answers(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Vec<Column> {
-    match directions(candidate, in_model).len() <= MOST_DIRECTIONS {
-        true => each_answer(rows, candidate, in_model),
-        false => vec![mixed_answer(rows, candidate, in_model)],
-    }
-}
-
-/// Of one direction the answer to it, of several that to the mixture of them that was found.
-pub(super) fn mixed_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelTerm) -> Column {
-    if let [(slot, direction)] = directions(candidate, in_model)[..] {
-        return rows.answer(slot, direction);
+    let each = each_answer(rows, candidate, in_model);
+    if each.len() <= MOST_DIRECTIONS {
+        return each;
     }
     let used = &candidate.coefficients[..in_model.score.coefficients];
     let units = rows.units(candidate, &in_model.score.parameters);
@@ -437,7 +409,7 @@ pub(super) fn mixed_answer(rows: &Rows, candidate: &Candidate, in_model: &ModelT
             mixture.iter_mut().zip(answer.iter()).for_each(|(sum, a)| *sum += unit * x * a);
         }
     }
-    Arc::new(mixture)
+    vec![Arc::new(mixture)]
 }
 
 /// Distance since a reversal that nobody has seen, m or rad.
@@ -457,8 +429,8 @@ fn sides(stretches: &[Samples], j: usize) -> Vec<Vec<f64>> {
     along.iter().map(|t| product(&direction, t)).chain(decays).collect()
 }
 
-/// Other functions of what the effect's features depend on, at every sample, and their orders, 1 where they have none; with sides or without.
-fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64], with_sides: bool) -> Vec<(Vec<f64>, f64)> {
+/// Other functions of what the effect's features depend on, at every sample; with sides or without.
+fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64], with_sides: bool) -> Vec<Vec<f64>> {
     let stretches = &rows.linear.samples;
     let features = &candidate.features;
     let any = |test: &dyn Fn(&Feature) -> bool| features.iter().any(test);
@@ -469,11 +441,7 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64], with_sides: bo
         all.dedup();
         all
     };
-    let mut curves: Vec<(Vec<f64>, f64)> = Vec::new();
-    let first = |x: Vec<f64>| (x, 1.0);
-    let wandering = |polynomials: &[Vec<f64>]| -> Vec<(Vec<f64>, f64)> {
-        own.iter().flat_map(|f| ordered(polynomials.iter().map(|t| product(f, t)).collect())).collect()
-    };
+    let mut curves: Vec<Vec<f64>> = Vec::new();
     let (history, rates, gravity, time) = (
         any(&Feature::needs_history),
         any(&Feature::needs_rates),
@@ -485,8 +453,8 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64], with_sides: bo
         let Some((_, phase)) = pair[0].wave() else { continue };
         let phase = phase.over(stretches, parameters);
         for overtone in [2.0, 3.0, 4.0, 5.0] {
-            curves.push((phase.iter().map(|p| (overtone * p).sin()).collect(), overtone));
-            curves.push((phase.iter().map(|p| (overtone * p).cos()).collect(), overtone));
+            curves.push(phase.iter().map(|p| (overtone * p).sin()).collect());
+            curves.push(phase.iter().map(|p| (overtone * p).cos()).collect());
         }
     }
     let is_wave = !curves.is_empty();
@@ -497,25 +465,38 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64], with_sides: bo
                 let (v, a) =
                     (column(stretches, *j, |c| &c.velocity), column(stretches, *j, |c| &c.acceleration));
                 let (v, a) = (by_largest(&v), by_largest(&a));
-                let powers =
-                    [power(&v, 2), power(&v, 3), power(&a, 2), power(&a, 3), absolute(&v), absolute(&a)];
-                curves.extend(powers.into_iter().chain([v, a]).map(first));
+                curves.extend([
+                    power(&v, 2),
+                    power(&v, 3),
+                    power(&a, 2),
+                    power(&a, 3),
+                    absolute(&v),
+                    absolute(&a),
+                ]);
+                curves.extend([v, a]);
             }
             if gravity {
                 let g = by_largest(&column(stretches, *j, |c| &c.gravity));
                 let load = by_largest(&column(stretches, *j, |c| &c.load));
-                let powers = [power(&g, 2), power(&g, 3), absolute(&g), power(&load, 2), power(&load, 3)];
-                curves.extend(powers.into_iter().chain([load, g]).map(first));
+                curves.extend([
+                    power(&g, 2),
+                    power(&g, 3),
+                    absolute(&g),
+                    power(&load, 2),
+                    power(&load, 3),
+                    load,
+                    g,
+                ]);
             }
             if history {
-                let sides = if with_sides { sides(stretches, *j) } else { Vec::new() };
-                curves.extend(sides.into_iter().map(first));
+                curves.extend(if with_sides { sides(stretches, *j) } else { Vec::new() });
             } else if !rates && !is_wave {
-                curves.extend(ordered(chebyshev(CURVE, &position)));
+                curves.extend(chebyshev(CURVE, &position).drain(1..));
             }
             // Its strength may differ along the way.
             if !is_wave || history {
-                curves.extend(wandering(&chebyshev(WANDER, &position)));
+                let wander = chebyshev(WANDER, &position);
+                curves.extend(own.iter().flat_map(|f| wander[1..].iter().map(|t| product(f, t))));
             }
         }
     }
@@ -524,16 +505,12 @@ fn curves(rows: &Rows, candidate: &Candidate, parameters: &[f64], with_sides: bo
         let clock = rescaled(&clock);
         if clock.len() == rows.linear.lines.len() {
             let course = chebyshev(CURVE, &clock);
-            curves.extend(wandering(&course[..=WANDER]));
-            curves.extend(ordered(course));
+            let wander = &course[1..=WANDER];
+            let wandering = own.iter().flat_map(|f| wander.iter().map(|t| product(f, t)));
+            curves.extend(course[1..].iter().cloned().chain(wandering));
         }
     }
     curves
-}
-
-/// Polynomials from the first order on, with their orders.
-fn ordered(all: Vec<Vec<f64>>) -> impl Iterator<Item = (Vec<f64>, f64)> {
-    all.into_iter().enumerate().skip(1).map(|(n, x)| (x, n as f64))
 }
 
 fn extent(x: &[f64]) -> f64 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::beside::Beside;
-use super::discrepancy::{self, Orders};
+use super::discrepancy;
 use super::equations::{Equations, Score};
 use super::evidence::likely_part;
 use super::marginal::{Marginal, solved};
@@ -155,7 +155,7 @@ impl Search<'_> {
     fn shape_of(&self, effect: &ModelTerm) -> DMatrix<f64> {
         let candidate = &self.candidates[effect.candidate];
         let answers = discrepancy::answers(self.rows, candidate, effect);
-        discrepancy::shape(self.rows, candidate, effect, answers, true, Orders::Alike).mixed().white
+        discrepancy::shape(self.rows, candidate, effect, answers, true).mixed().white
     }
 
     /// Gram matrix of columns beside a marginal, and what leads from them to the residuals.

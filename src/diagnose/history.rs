@@ -41,7 +41,7 @@ impl Past {
     }
 
     fn new(rows: &Rows, answers: Vec<Column>, [before, sides]: [Vec<Column>; 2], field: &Field) -> Self {
-        let white = |curves: &[Column]| whitened(rows, answers.clone(), curves.to_vec(), |_| 1.0);
+        let white = |curves: &[Column]| whitened(rows, answers.clone(), curves.to_vec(), 1.0);
         let (first, second): (Unmixed, Unmixed) = (white(&before), white(&sides));
         let columns = side_by_side(&[&first.white, &second.white], rows.residual.len());
         let behind =

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::beside::Beside;
-use super::discrepancy::{self, Orders, PART};
+use super::discrepancy;
 use super::equations::Equations;
 use super::evidence::log_mean_exp;
 use super::past::Past;
@@ -23,9 +23,6 @@ const FOREIGN: f64 = 0.01;
 
 /// Evidence that a shape of its own may lend a hypothesis, as part of the energy that it takes away.
 const OWN: f64 = 0.25;
-
-/// Relative departures from a family's shape.
-const DEPARTURES: [f64; 3] = [0.3, 0.1, 0.03];
 
 /// An effect together with what nobody knows of how it was before.
 pub(super) struct WithState {
@@ -103,20 +100,16 @@ impl Search<'_> {
         with_shape: bool,
     ) -> Beside {
         let (rows, marginal, left) = (self.rows, &field.marginal, &field.left);
-        // A shape is another law of the motion that was found, not another motion.
-        let answers = match with_shape {
-            true => vec![discrepancy::mixed_answer(rows, candidate, effect)],
-            false => discrepancy::answers(rows, candidate, effect),
-        };
+        let answers = discrepancy::answers(rows, candidate, effect);
         if let Some((past, features)) = Past::of(rows, candidate, effect, field).filter(|_| self.in_motion) {
             // Features of one history have its columns each.
             let size = discrepancy::amplitude(effect);
-            let scales = [size * (features as f64).sqrt(), PART * size];
+            let scales = [size * (features as f64).sqrt(), discrepancy::PART * size];
             let initial = discrepancy::own_initial_conditions(rows, candidate, effect, answers.clone()).white;
             if !with_shape {
                 return Beside::with_past(rows, (&past, &scales[..1]), &[&initial, white], marginal, left);
             }
-            let shape = discrepancy::shape(rows, candidate, effect, answers, false, Orders::Fade).white;
+            let shape = discrepancy::shape(rows, candidate, effect, answers, false).white;
             return Beside::with_past(rows, (&past, &scales), &[&initial, &shape, white], marginal, left);
         }
         let initial = match self.in_motion {
@@ -126,38 +119,36 @@ impl Search<'_> {
         if !with_shape {
             return Beside::new(&[&initial, white], marginal, left);
         }
-        let shape = discrepancy::shape(rows, candidate, effect, answers, true, Orders::Fade).white;
+        let shape = discrepancy::shape(rows, candidate, effect, answers, true).white;
         Beside::new(&[&initial, &shape, white], marginal, left)
     }
 
-    /// The weight of a hypothesis whose shape is that of its family, or departs from it by one of [`DEPARTURES`], each as likely, (66).
+    /// The weight of a hypothesis of which as likely as not the shape departs from the family's, (66).
     pub fn with_discrepancy(&self, hypothesis: &Hypothesis, field: &Field) -> f64 {
-        let departing = self.departing(hypothesis, field).unwrap_or_default();
-        log_mean_exp(&[&[hypothesis.weight], departing.as_slice()].concat())
+        self.with_shape(hypothesis, field)
+            .map_or(hypothesis.weight, |weight| log_mean_exp(&[hypothesis.weight, weight]))
     }
 
-    /// The same where it does depart, by each of them; `None` where a feature is not there.
-    fn departing(&self, hypothesis: &Hypothesis, field: &Field) -> Option<Vec<f64>> {
+    /// The same where it does depart; `None` where a feature is not there.
+    fn with_shape(&self, hypothesis: &Hypothesis, field: &Field) -> Option<f64> {
         let candidate = &self.candidates[hypothesis.candidate];
         let parameters = &hypothesis.score.parameters;
         let white = self.rows.of(candidate, parameters)?;
         let effect = self.enter_directed(hypothesis, &white, (&field.marginal, &field.left))?;
         let all = self.with_unknown(candidate, &effect, &white, field, true).seen(2);
-        let own = |equations: &Equations| {
-            self.rows.score_by(candidate, parameters, equations, self.overdispersion).at_best
+        let with_initial = all.others();
+        let grown = |own: &Equations| {
+            let score = self.rows.score_by(candidate, parameters, own, self.overdispersion);
+            score.at_best - hypothesis.score.at_best
         };
-        let textbook = own(&all.others().last());
-        let weight = hypothesis.weight + all.worth(self.overdispersion) + textbook - hypothesis.score.at_best;
+        let (by_initial, by_discrepancy) =
+            (grown(&with_initial.last()), grown(&with_initial.others().last()));
+        let initial = hypothesis.weight + all.worth(self.overdispersion);
+        let discrepancy = (1.0 - FOREIGN) * with_initial.worth(self.overdispersion);
         // What owes more to a shape of its own than right names do owes it to something else.
-        let most = match Rule::OwnShapeIsLimited.decides() {
-            true => OWN * hypothesis.reach / self.overdispersion,
+        Some((initial + discrepancy + by_discrepancy).min(match Rule::OwnShapeIsLimited.decides() {
+            true => initial + by_initial + OWN * hypothesis.reach / self.overdispersion,
             false => f64::INFINITY,
-        };
-        let departing = |departure: &f64| {
-            let shaped = all.others().with_first(departure / PART);
-            let more = shaped.worth(self.overdispersion) + own(&shaped.others().last()) - textbook;
-            weight + (more - FOREIGN * more.max(0.0)).min(most)
-        };
-        Some(DEPARTURES.iter().map(departing).collect())
+        }))
     }
 }

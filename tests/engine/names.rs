@@ -42,14 +42,6 @@ fn a_straight_line_is_no_positioning_error() {
     assert_eq!(names(&said_of(bent, &["scale_error"])), ["positioning_error"]);
 }
 
-/// A fortieth of a line is what lines are off by; a quarter is a curve.
-#[test]
-fn a_line_that_bends_a_little_is_a_scale_error() {
-    let bent = |part: f64| move |at: f64, _: f64| 2e-5 * (at + part * 100.0 * (at / 40.0).sin());
-    assert_eq!(names(&said_of(bent(0.025), &[])), ["scale_error"]);
-    assert_eq!(names(&said_of(bent(0.25), &[])), ["positioning_error"]);
-}
-
 /// What turns round slowly is seen to cross its play: seven samples for 0.05 deg.
 #[test]
 fn play_that_is_seen_to_be_crossed_is_no_hysteresis() {
