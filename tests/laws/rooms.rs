@@ -233,3 +233,19 @@ fn links_of_the_readme_are_in_the_package_and_all_pages_are_listed() {
         .collect();
     assert!(unlisted.is_empty(), "not in the list of all pages: {unlisted:?}");
 }
+
+/// Where one setting differs, every crate is built once more: minutes of CI.
+#[test]
+fn crates_of_users_are_built_in_the_profile_of_the_tests() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let profile = |file: &str, name: &str| -> BTreeSet<String> {
+        let text = read(&root.join(file));
+        let table = text.split_once(&format!("[profile.{name}]\n")).expect("a profile").1;
+        let settings = table.lines().take_while(|line| !line.starts_with('['));
+        settings.filter(|line| line.contains(" = ")).map(str::to_string).collect()
+    };
+    let of_tests = profile("Cargo.toml", "test");
+    for file in ["tests/outside/Cargo.toml", "tests/users/programmer.sh", "python/Cargo.toml"] {
+        assert_eq!(profile(file, "dev"), of_tests, "{file}");
+    }
+}

@@ -21,7 +21,10 @@ kincal = { path = "$project", default-features = false }
 [profile.dev]
 opt-level = 1
 debug = false
+debug-assertions = false
+overflow-checks = true
 incremental = false
+lto = "off"
 
 [profile.dev.package]
 matrixmultiply = { opt-level = 2 }
