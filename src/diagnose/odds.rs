@@ -17,10 +17,10 @@ const SHIFT: f64 = 0.002;
 const ALIKE: f64 = 0.12;
 /// But no names that are so much rarer, as a logarithm.
 const RARER: f64 = 1.2;
-/// Trust in names falls where shapes take up more than this part of the structure, to this at least, and by half where the evidence is
-/// no more than this.
+/// Trust in names falls half the way where shapes take up this part of the structure, and never below this.
 const ODDER: f64 = 0.12;
 const LEAST: f64 = 0.55;
+/// It falls by half where the evidence is no more than this.
 const SLIGHT: f64 = 30.0;
 /// Places between which the logarithm of the likelihood differs by less, as one standard deviation makes it, are not told apart.
 const SAME: f64 = 0.5;
