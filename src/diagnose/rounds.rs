@@ -28,6 +28,8 @@ use crate::recording::Recording;
 const NOISE_ROUNDS: usize = 3;
 /// So many times the machine is linearised anew, or taken as late as was found, where effects are so large that it has to be.
 const MOVES: usize = 3;
+/// So many times what is no longer the likeliest gives its place, where names go by what they foretell.
+const EXCHANGES: usize = 4;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
 
@@ -201,9 +203,27 @@ fn drives(linear: &Linear, coarse: &Coarse, candidates: &[Candidate], library: &
     })
 }
 
-/// Of what the search found, the effects that foretell what was left out, where nothing is left to be gained by their parameters.
+/// Of what the search found, the effects that foretell what was left out, where nothing is left to be gained by their parameters. Where one goes,
+/// another name may be the likeliest for what stood beside it: that takes its place, unless this foretells worse by more than one standard error.
 fn kept(search: &Search, found: Vec<ModelTerm>) -> Vec<ModelTerm> {
-    search.polished(&folds::useful(search, &less_rare(search, found)))
+    let found = less_rare(search, found);
+    let useful = folds::useful(search, &found);
+    if useful.len() == found.len() {
+        return search.polished(&useful);
+    }
+    let mut last = useful.clone();
+    for _ in 0..EXCHANGES {
+        if !search.likeliest(&mut last) {
+            break;
+        }
+        let count = last.len();
+        last = folds::useful(search, &last);
+        if last.len() == count {
+            break;
+        }
+    }
+    let stays = folds::are_better(search, &useful, &last);
+    search.polished(if stays { &useful } else { &last })
 }
 
 /// Families that are met more often than this part of the most frequent one are common.

@@ -175,9 +175,7 @@ impl Search<'_> {
         let mut i = 0;
         while i < in_model.len() {
             let hypotheses = self.rivals_of(in_model, i);
-            let others = all_but(in_model, Some(i));
-            let mut worthy = hypotheses.iter().take_while(|r| r.weight > ENTER);
-            let Some(best) = worthy.find(|r| !self.repeats(r, &others)) else {
+            let Some(best) = self.best(&hypotheses, &all_but(in_model, Some(i))) else {
                 in_model.remove(i);
                 changed = true;
                 continue;
@@ -195,6 +193,21 @@ impl Search<'_> {
                 in_model[i] = entered.instead_of(&in_model[i]);
             }
             i += 1;
+        }
+        changed
+    }
+
+    /// Every effect that is no longer the likeliest in its place gives it to the one that is, none goes; whether one did.
+    pub fn likeliest(&self, in_model: &mut [ModelTerm]) -> bool {
+        let mut changed = false;
+        for i in 0..in_model.len() {
+            let hypotheses = self.rivals_of(in_model, i);
+            let best = self.best(&hypotheses, &all_but(in_model, Some(i)));
+            let Some(best) = best.filter(|best| best.candidate != in_model[i].candidate) else { continue };
+            if let Some(entered) = self.settle(best, &self.ground(in_model, Some(i))) {
+                in_model[i] = entered.instead_of(&in_model[i]);
+                changed = true;
+            }
         }
         changed
     }

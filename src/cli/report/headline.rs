@@ -52,27 +52,31 @@ pub(crate) fn of_diagnosis(diagnosis: &Diagnosis) -> String {
     if diagnosis.unexplained.as_ref().is_some_and(|u| u.parts.iter().any(|part| part.modelled)) {
         names.push("what has no name".into());
     }
-    let is_bare = diagnosis.unexplained.is_none() && !more && is_noise(diagnosis);
+    let left = left_over_noise(diagnosis);
+    let is_noise = left.is_some_and(|times| times <= NOISE);
+    let is_bare = diagnosis.unexplained.is_none() && !more && is_noise;
     if is_bare && parts.iter().all(|(nominal, last, ..)| *last > NOTHING * nominal) {
         return format!("The machine is {} off, which is noise.", joined(&parts, |p| Some((p.0, p.3))));
     }
     let mut text = sentence(&parts, diagnosis.geometry_numbers, &names);
     if let Some(unexplained) = &diagnosis.unexplained {
         text += &format!(" Something at {} is left that no name explains.", unexplained.at);
-    } else if is_noise(diagnosis) {
+    } else if is_noise {
         text += " What is left is noise.";
+    } else if let Some(times) = left {
+        text += &format!(" What is left is {times:.1} times the noise.");
     }
     text
 }
 
-/// Whether what is left is what the instrument makes.
-fn is_noise(diagnosis: &Diagnosis) -> bool {
-    let pairs = [(diagnosis.rms.m, diagnosis.noise_floor.m), (diagnosis.rms.rad, diagnosis.noise_floor.rad)];
-    let one = |rms: &crate::diagnose::RmsByModel, noise: f64| rms.r#final <= NOISE * noise;
-    diagnosis.outliers.is_empty()
-        && pairs
-            .iter()
-            .all(|(rms, noise)| rms.as_ref().zip(*noise).is_none_or(|(rms, noise)| one(rms, noise)))
+/// What is left in units of the noise, of lengths or of angles, whichever is more; nothing where outliers are part of it.
+fn left_over_noise(diagnosis: &Diagnosis) -> Option<f64> {
+    let pairs =
+        [(&diagnosis.rms.m, diagnosis.noise_floor.m), (&diagnosis.rms.rad, diagnosis.noise_floor.rad)];
+    let ratios = pairs
+        .into_iter()
+        .filter_map(|(rms, noise)| Some(rms.as_ref()?.r#final / noise?.max(f64::MIN_POSITIVE)));
+    ratios.max_by(f64::total_cmp).filter(|_| diagnosis.outliers.is_empty())
 }
 
 /// Root mean squares as declared, with geometry, with what was found, and whether they are angles.
