@@ -6,9 +6,10 @@ use super::finding::Finding;
 use super::nameless::{Proposal, Unexplained, library_text};
 use super::not_tried::NotTried;
 use super::pictures::Traces;
+use super::rms::LeftOut;
 use super::side_branches::UnseenSideBranch;
 use crate::effects::StoredEffect;
-use crate::identify::{Approach, FarOff};
+use crate::identify::{Approach, BeforeAfter, FarOff};
 use crate::location::LocationErrors;
 use crate::units::{ByQuantity, field_by_quantity};
 
@@ -65,6 +66,9 @@ pub struct Diagnosis {
     /// What the calibrated file is made of: the effects of `findings` and `shared`, ready to be fitted on the real model.
     #[serde(skip)]
     pub(super) named: Vec<Named>,
+    /// What its model leaves of stretches that took no part in its fit.
+    #[serde(skip)]
+    pub(super) left_out: LeftOut,
     /// Effects that could not be looked for in these recordings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_tried: Vec<NotTried>,
@@ -142,6 +146,13 @@ pub struct RmsByModel {
     pub geometric: f64,
     /// With what was found besides.
     pub r#final: f64,
+}
+
+impl RmsByModel {
+    pub(super) fn of(fit: Option<BeforeAfter>, last: Option<f64>) -> Option<Self> {
+        let (fit, last) = (fit?, last?);
+        Some(RmsByModel { nominal: fit.nominal, geometric: fit.geometric, r#final: last })
+    }
 }
 
 /// Held-out RMS under two models.

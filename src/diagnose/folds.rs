@@ -9,7 +9,7 @@ use super::finding::HeldOutPair;
 use super::marginal::{gram, with_prior};
 use super::noise::Noise;
 use super::policy::Rule;
-use super::rms::rms_of;
+use super::rms::{LeftOut, rms_of, sum_and_error};
 use super::search::Search;
 use super::terms::{ModelTerm, joined};
 use crate::feature::Samples;
@@ -33,6 +33,7 @@ pub(super) fn fill(search: &Search, told: &[ModelTerm], diagnosis: &mut Diagnosi
         Some(HeldOutRms { geometric: rms(&geometric)?, r#final: rms(&last)? })
     };
     diagnosis.held_out_rms = ByQuantity::of(|quantity| both(quantity == Quantity::Angle));
+    diagnosis.left_out = folds.squares(search, &last);
     let is_of = |a: usize, b: usize| a == b || search.is_one(told[a].candidate, told[b].candidate);
     for (i, finding) in diagnosis.findings.iter_mut().enumerate() {
         let before = with(&|effect| !is_of(effect, i));
@@ -256,18 +257,16 @@ fn grams(
 }
 
 /// What foretells stretches that were left out, (68): effects without which these are foretold better go, the worst first, and all of them
-/// where together they do worse than geometry alone. In motion that has to be so by more than a standard error; what is undecided stays.
-/// Settled positions are few, and where none is repeated nothing tells their noise: there every effect has to prove itself, by as much.
-/// Judged as the file has them, where drives give way by what is named alone.
-pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> {
+/// where together they do worse than geometry alone; `least`: as [`least`] has it. Judged as the file has them, where drives give way by what is named alone.
+pub(super) fn useful(search: &Search, in_model: &[ModelTerm], least: f64) -> Vec<ModelTerm> {
     let mut kept = in_model.to_vec();
     while let Some(folds) = Folds::rigid(search, &kept) {
-        match folds.worst(search, kept.len()) {
+        match folds.worst(search, kept.len(), least) {
             Some(worst) if Rule::HasToForetell.decides() => drop(kept.remove(worst)),
             Some(_) => break,
             None => {
                 let (alone, all) = (folds.left_out(search, &|_| false), folds.left_out(search, &|_| true));
-                if is_harm(search.in_motion, folds.fall(search, &alone, &all)) {
+                if is_harm(least, folds.fall(search, &alone, &all)) {
                     kept.clear();
                 }
                 break;
@@ -279,12 +278,18 @@ pub(super) fn useful(search: &Search, in_model: &[ModelTerm]) -> Vec<ModelTerm> 
 
 /// Of the first `names` of these effects, the one without which left-out stretches are foretold best, if that is better than with it, as above.
 pub(super) fn worst(search: &Search, in_model: &[ModelTerm], names: usize) -> Option<usize> {
-    Folds::new(search, in_model)?.worst(search, names)
+    Folds::new(search, in_model)?.worst(search, names, least(search))
+}
+
+/// By so many standard errors left-out stretches have to be foretold better with an effect that stays. Along a path what is undecided stays.
+/// Settled positions are few, and where none is repeated nothing tells their noise: there every effect has to prove itself.
+pub(super) fn least(search: &Search) -> f64 {
+    if search.in_motion { -1.0 } else { 1.0 }
 }
 
 /// Whether an effect goes by which squares fall so much, with this standard error.
-fn is_harm(in_motion: bool, (gain, error): (f64, f64)) -> bool {
-    gain < if in_motion { -error } else { error }
+fn is_harm(least: f64, (gain, error): (f64, f64)) -> bool {
+    gain < least * error
 }
 
 /// Normal equations of all samples and of each fold.
@@ -365,9 +370,9 @@ impl Folds {
     }
 
     /// Of the first `names` effects the one that does the greatest harm, if one does.
-    fn worst(&self, search: &Search, names: usize) -> Option<usize> {
+    fn worst(&self, search: &Search, names: usize, least: f64) -> Option<usize> {
         let each = (0..names).map(|i| (i, self.gain(search, i)));
-        let worse = each.filter(|(_, gain)| is_harm(search.in_motion, *gain));
+        let worse = each.filter(|(_, gain)| is_harm(least, *gain));
         worse.min_by(|(_, (a, _)), (_, (b, _))| a.total_cmp(b)).map(|(i, _)| i)
     }
 
@@ -461,9 +466,20 @@ impl Folds {
                 *cells.entry((number, self.stretch[row])).or_default() += of_row(row, linear.angle[row]);
             }
         }
-        let (count, sum) = (cells.len() as f64, cells.values().sum::<f64>());
-        let spread = cells.values().map(|x| (x - sum / count).powi(2)).sum::<f64>() / (count - 1.0);
-        (sum, (count * spread).sqrt())
+        sum_and_error(&cells.into_values().collect::<Vec<f64>>())
+    }
+
+    /// Squares of what is left of each stretch.
+    fn squares(&self, search: &Search, left: &[f64]) -> LeftOut {
+        let linear = search.rows.linear;
+        let mut all = LeftOut::default();
+        for (number, span) in linear.spans.iter().enumerate() {
+            for row in (span.rows.0..span.rows.1).filter(|row| !search.rows.whitener.out[*row]) {
+                let quantity = if linear.angle[row] { Quantity::Angle } else { Quantity::Length };
+                all.add(number, self.stretch[row], quantity, left[row]);
+            }
+        }
+        all
     }
 
     /// Mean squares of what is left in the rows that count.
@@ -521,15 +537,11 @@ mod tests {
     use super::is_harm;
 
     #[test]
-    fn what_is_undecided_stays_along_a_path_and_goes_of_settled_positions() {
-        for (gain, along_a_path, settled) in
+    fn an_effect_goes_that_harms_by_a_standard_error_or_helps_by_less_where_it_has_to_prove_itself() {
+        for (gain, stays, goes) in
             [(-2.0, true, true), (-0.5, false, true), (0.5, false, true), (2.0, false, false)]
         {
-            assert_eq!(
-                (is_harm(true, (gain, 1.0)), is_harm(false, (gain, 1.0))),
-                (along_a_path, settled),
-                "{gain}"
-            );
+            assert_eq!((is_harm(-1.0, (gain, 1.0)), is_harm(1.0, (gain, 1.0))), (stays, goes), "{gain}");
         }
     }
 }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::approaches::{approaches, stand_still};
 use super::contained::says_no_more;
-use super::diagnosis::{Diagnosis, Named, SharedEffect, Thinned};
+use super::diagnosis::{Diagnosis, Named, RmsByModel, SharedEffect, Thinned};
 use super::discrepancy::is_of_position;
 use super::doubt::{CHANCE, Doubt, doubt, still};
 use super::drives::Drives;
@@ -22,7 +22,7 @@ use super::pictures::Traces;
 use super::placebo::{Placebo, placebo};
 use super::policy::Rule;
 use super::propose;
-use super::rms::{by_model, rms_of};
+use super::rms::{LeftOut, rms_of};
 use super::search::Search;
 use super::set_ups;
 use super::shared;
@@ -328,7 +328,7 @@ impl Modelled {
             noise_floor: ByQuantity::of(|quantity| sigma_of(search, noise, quantity == Quantity::Angle)),
             rms: ByQuantity::of(|quantity| {
                 let left = rms_of(search, &left_over, quantity == Quantity::Angle);
-                by_model(linear.fit.rms[quantity], left)
+                RmsByModel::of(linear.fit.rms[quantity], left)
             }),
             geometry_numbers: linear.fit.combinations.iter().filter(|c| c.share > 0.5).count() as u64,
             held_out_rms: ByQuantity::default(),
@@ -354,6 +354,7 @@ impl Modelled {
             dropped: linear.fit.dropped,
             outliers: Vec::new(),
             rms_without_outliers: ByQuantity::default(),
+            left_out: LeftOut::default(),
             traces: Traces::default(),
             location_errors: linear.fit.location_errors.clone(),
         };

@@ -30,6 +30,9 @@ const NOISE_ROUNDS: usize = 3;
 const MOVES: usize = 3;
 /// So many times what is no longer the likeliest gives its place, where names go by what they foretell.
 const EXCHANGES: usize = 4;
+/// By so many standard errors one set foretells more than another where both were chosen on other grounds. What one stretch alone says is one at
+/// most, however much it is.
+const DECIDED: f64 = 0.5;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
 
@@ -138,6 +141,13 @@ impl Case<'_> {
                     may_be_late: lag::may_be_late(search, in_model).filter(|_| Rule::MayBeLate.decides()),
                 }
             };
+            // Of two sets the second one, of effects that have each proved themselves, if it foretells more with all that is modelled beside it.
+            let better = |search: &Search, sets: &(Vec<ModelTerm>, Option<Vec<ModelTerm>>)| -> Said {
+                let first = report(search, &sets.0);
+                let Some(proved) = sets.1.as_ref().map(|proved| report(search, proved)) else { return first };
+                let (fall, error) = proved.diagnosis.left_out.fall_from(&first.diagnosis.left_out);
+                if fall > DECIDED * error { proved } else { first }
+            };
             if moves < MOVES && !in_model.is_empty() || origin.is_some() {
                 let there =
                     relinearised::straightened(&search, &in_model, machine, recordings, &facts.dead_bands)?;
@@ -170,11 +180,12 @@ impl Case<'_> {
             if round == NOISE_ROUNDS || is_settled(&judged) {
                 let overdispersion = search.leftover(&search.beside(&in_model, None)).overdispersion;
                 if overdispersion < HOT || !Rule::SearchesAgain.decides() {
-                    return Ok(report(&search, &kept(&search, search.unfolded(in_model))));
+                    return Ok(better(&search, &sets_of(&search, search.unfolded(in_model))));
                 }
                 // Much is left, as it always is on real machines: the simplest names that stand out from it count.
                 let search = search.against(overdispersion);
-                in_model = kept(&search, search.unfolded(search.run(&in_model, |_| true)));
+                let sets = sets_of(&search, search.unfolded(search.run(&in_model, |_| true)));
+                in_model.clone_from(&sets.0);
                 if moves < MOVES
                     && let Some(lagged) = lagged(&search, &in_model, plain)
                 {
@@ -182,7 +193,7 @@ impl Case<'_> {
                     coarse = Coarse::new(&linear, &candidates);
                     continue;
                 }
-                return Ok(report(&search, &in_model));
+                return Ok(better(&search, &sets));
             }
             (noise, round) = (judged, round + 1);
         }
@@ -203,13 +214,26 @@ fn drives(linear: &Linear, coarse: &Coarse, candidates: &[Candidate], library: &
     })
 }
 
-/// Of what the search found, the effects that foretell what was left out, where nothing is left to be gained by their parameters. Where one goes,
-/// another name may be the likeliest for what stood beside it: that takes its place, unless this foretells worse by more than one standard error.
-fn kept(search: &Search, found: Vec<ModelTerm>) -> Vec<ModelTerm> {
+/// Of what the search found, the set that is told. Of settled positions two: the effects without which left-out stretches are foretold worse,
+/// and those that have each proved themselves. Nothing is left to be gained by their parameters.
+fn sets_of(search: &Search, found: Vec<ModelTerm>) -> (Vec<ModelTerm>, Option<Vec<ModelTerm>>) {
     let found = less_rare(search, found);
-    let useful = folds::useful(search, &found);
+    let least = folds::least(search);
+    if search.in_motion {
+        return (search.polished(&kept(search, &found, least)), None);
+    }
+    let (first, proved) = (kept(search, &found, 0.0), kept(search, &found, least));
+    let of = |set: &[ModelTerm]| -> Vec<usize> { set.iter().map(|effect| effect.candidate).collect() };
+    let is_other = of(&proved) != of(&first);
+    (search.polished(&first), is_other.then(|| search.polished(&proved)))
+}
+
+/// The effects that foretell what was left out. Where one goes, another name may be the likeliest for what stood beside it: that takes its place,
+/// unless this foretells worse by more than one standard error.
+fn kept(search: &Search, found: &[ModelTerm], least: f64) -> Vec<ModelTerm> {
+    let useful = folds::useful(search, found, least);
     if useful.len() == found.len() {
-        return search.polished(&useful);
+        return useful;
     }
     let mut last = useful.clone();
     for _ in 0..EXCHANGES {
@@ -217,13 +241,12 @@ fn kept(search: &Search, found: Vec<ModelTerm>) -> Vec<ModelTerm> {
             break;
         }
         let count = last.len();
-        last = folds::useful(search, &last);
+        last = folds::useful(search, &last, least);
         if last.len() == count {
             break;
         }
     }
-    let stays = folds::are_better(search, &useful, &last);
-    search.polished(if stays { &useful } else { &last })
+    if folds::are_better(search, &useful, &last) { useful } else { last }
 }
 
 /// Families that are met more often than this part of the most frequent one are common.

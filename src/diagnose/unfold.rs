@@ -58,7 +58,7 @@ impl Search<'_> {
             names.push(ModelTerm { near, ..entered });
             sum += weight;
             let resolved = [others.as_slice(), &names].concat();
-            let is_useful = || folds::useful(self, &resolved).len() == resolved.len();
+            let is_useful = || folds::useful(self, &resolved, folds::least(self)).len() == resolved.len();
             // Beside the shapes of the others each has to stand out by itself.
             let stands_out = |i: usize| {
                 let own = |r: &Hypothesis| r.candidate == resolved[i].candidate && r.weight > ENTER;
