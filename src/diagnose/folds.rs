@@ -257,7 +257,8 @@ fn grams(
 }
 
 /// What foretells stretches that were left out, (68): effects without which these are foretold better go, the worst first, and all of them
-/// where together they do worse than geometry alone; `least`: as [`least`] has it. Judged as the file has them, where drives give way by what is named alone.
+/// where together they do worse than geometry alone. `least`: by so many standard errors one that stays makes them better. Judged as the file
+/// has them, where drives give way by what is named alone.
 pub(super) fn useful(search: &Search, in_model: &[ModelTerm], least: f64) -> Vec<ModelTerm> {
     let mut kept = in_model.to_vec();
     while let Some(folds) = Folds::rigid(search, &kept) {

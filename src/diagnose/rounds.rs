@@ -30,8 +30,8 @@ const NOISE_ROUNDS: usize = 3;
 const MOVES: usize = 3;
 /// So many times what is no longer the likeliest gives its place, where names go by what they foretell.
 const EXCHANGES: usize = 4;
-/// By so many standard errors one set foretells more than another where both were chosen on other grounds. What one stretch alone says is one at
-/// most, however much it is.
+/// By so many standard errors a set whose effects have each proved themselves foretells more where it is told. What one stretch alone says is one
+/// at most, however much it is.
 const DECIDED: f64 = 0.5;
 /// Where chance is that much larger than the noise, the effects are chosen once more against it.
 const HOT: f64 = 3.0;
@@ -141,7 +141,8 @@ impl Case<'_> {
                     may_be_late: lag::may_be_late(search, in_model).filter(|_| Rule::MayBeLate.decides()),
                 }
             };
-            // Of two sets the second one, of effects that have each proved themselves, if it foretells more with all that is modelled beside it.
+            // Of two sets the second one, of effects that have each proved themselves, if it foretells more with all that is modelled beside
+            // it.
             let better = |search: &Search, sets: &(Vec<ModelTerm>, Option<Vec<ModelTerm>>)| -> Said {
                 let first = report(search, &sets.0);
                 let Some(proved) = sets.1.as_ref().map(|proved| report(search, proved)) else { return first };
