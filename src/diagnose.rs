@@ -58,6 +58,7 @@ mod score;
 mod search;
 mod series;
 mod set_ups;
+mod sets;
 mod shared;
 mod shares;
 mod side_branches;

@@ -312,10 +312,13 @@ pub fn concealed(data: &Data) -> Outcome<String> {
         let count = counts.entry((case.concealed.name(), ratio >= 2.0)).or_default();
         count.of += 1;
         count.right += usize::from(is_right);
-        count.kept += usize::from(own.findings.iter().all(stays));
+        let gone: Vec<String> = (own.findings.iter().filter(|name| !stays(name)))
+            .map(|(effect, at)| format!(", {effect} at {at} gone"))
+            .collect();
+        count.kept += usize::from(gone.is_empty());
         let name = case.concealed.name();
         let word = if is_right { "named" } else { "not named" };
-        eprintln!("  {number}: {name} at {} of {}: {word}", case.command, set.name);
+        eprintln!("  {number}: {name} at {} of {}: {word}{}", case.command, set.name, gone.concat());
     }
     let mut table =
         Table::new(&["concealed", "times the held-out error", "named with its joint", "own findings stay"]);

@@ -52,6 +52,8 @@ pub(super) enum Rule {
     OutliersAgain,
     /// What is off at every reversal is no outlier (`noise.rs`).
     SparesReversals,
+    /// Of settled positions a likelier set takes the place of what was found one by one (`sets.rs`).
+    WeighsSets,
     /// The other story: an axis that is late (`lag.rs`).
     MayBeLate,
 

@@ -223,10 +223,21 @@ fn sets_of(search: &Search, found: Vec<ModelTerm>) -> (Vec<ModelTerm>, Option<Ve
     if search.in_motion {
         return (search.polished(&kept(search, &found, least)), None);
     }
+    let found = likelier(search, found);
     let (first, proved) = (kept(search, &found, 0.0), kept(search, &found, least));
     let of = |set: &[ModelTerm]| -> Vec<usize> { set.iter().map(|effect| effect.candidate).collect() };
     let is_other = of(&proved) != of(&first);
     (search.polished(&first), is_other.then(|| search.polished(&proved)))
+}
+
+/// As a likelier set and what stands out beside that, while there is one.
+fn likelier(search: &Search, mut found: Vec<ModelTerm>) -> Vec<ModelTerm> {
+    for _ in 0..EXCHANGES {
+        let Some(set) = search.likelier_set(&found) else { break };
+        let more = search.run(&set, |_| true);
+        found = if search.weight_of(&more) > search.weight_of(&set) { more } else { set };
+    }
+    found
 }
 
 /// The effects that foretell what was left out. Where one goes, another name may be the likeliest for what stood beside it: that takes its place,

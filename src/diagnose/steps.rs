@@ -13,7 +13,7 @@ use super::terms::{Hypothesis, ModelTerm, all_but};
 /// So many candidates that came next to an effect are compared with it again and again.
 pub(super) const NEAR: usize = 40;
 /// So many times every effect is held against all that may stand in its place.
-const PASSES: usize = 2;
+pub(super) const PASSES: usize = 2;
 /// An effect that takes away less than this part of the structure that is left is a poor name for it.
 const WORTH: f64 = 0.2;
 /// The same among settled positions, where many joints give way a little each.
