@@ -60,6 +60,8 @@ pub(super) enum Rule {
     // ---- What is told ----
     /// What foretells left-out stretches worse goes (`folds.rs`).
     HasToForetell,
+    /// Of settled positions effects that have each proved themselves are told alone where they foretell more (`rounds.rs`).
+    ProvedAlone,
     /// Many functions of position at one joint are patches of a curve (`doubt.rs`).
     Patches,
     /// Names that leave much are no explanation (`doubt.rs`).

@@ -147,7 +147,7 @@ impl Case<'_> {
                 let first = report(search, &sets.0);
                 let Some(proved) = sets.1.as_ref().map(|proved| report(search, proved)) else { return first };
                 let (fall, error) = proved.diagnosis.left_out.fall_from(&first.diagnosis.left_out);
-                if fall > DECIDED * error { proved } else { first }
+                if fall > DECIDED * error && Rule::ProvedAlone.decides() { proved } else { first }
             };
             if moves < MOVES && !in_model.is_empty() || origin.is_some() {
                 let there =
