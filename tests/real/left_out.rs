@@ -5,7 +5,7 @@ use kincal::predict::predict;
 use kincal::recording::Recording;
 use kincal::{CalibratedMachine, Machine};
 
-use super::sets::{Fold, Set};
+use super::sets::{Fold, Judged, Set};
 
 /// Root mean square over recordings, mm.
 fn rms(calibrated: &CalibratedMachine, recordings: &[Recording]) -> (f64, u64) {
@@ -23,16 +23,18 @@ pub fn cross_validate(set: &Set, folds: &[Fold], machine: &Machine, options: Cal
     for fold in folds {
         let (learnt, _) =
             calibrate(machine, &fold.train, options).unwrap_or_else(|e| panic!("{}: {e}", set.name));
-        let place = if fold.setup.is_empty() { &fold.train } else { &fold.setup };
-        let placed = |known: &CalibratedMachine| {
-            fit_setup(known, place, options.loss).unwrap_or_else(|e| panic!("{}: {e}", set.name))
-        };
-        // What was learnt knows where its own set-up stands.
-        let learnt = if fold.setup.is_empty() { learnt } else { placed(&learnt) };
-        before += rms(&placed(&nominal), &fold.test).0;
-        let (sum, count) = rms(&learnt, &fold.test);
-        after += sum;
-        samples += count;
+        for Judged { setup, test } in &fold.judged {
+            let place = if setup.is_empty() { &fold.train } else { setup };
+            let placed = |known: &CalibratedMachine| {
+                fit_setup(known, place, options.loss).unwrap_or_else(|e| panic!("{}: {e}", set.name))
+            };
+            // What was learnt knows where its own set-up stands.
+            let (sum, count) =
+                if setup.is_empty() { rms(&learnt, test) } else { rms(&placed(&learnt), test) };
+            before += rms(&placed(&nominal), test).0;
+            after += sum;
+            samples += count;
+        }
     }
     let mean = |sum: f64| (sum / samples as f64).sqrt();
     (mean(before), mean(after))

@@ -66,9 +66,14 @@ pub enum Split {
     Pose,
 }
 
-/// What is learnt from, what finds the set-up again (nothing: no need), and what is judged.
+/// What is learnt from, and what is judged with that.
 pub struct Fold {
     pub train: Vec<Recording>,
+    pub judged: Vec<Judged>,
+}
+
+/// What finds the set-up again (nothing: no need), and what is judged.
+pub struct Judged {
     pub setup: Vec<Recording>,
     pub test: Vec<Recording>,
 }
@@ -108,38 +113,37 @@ impl Set {
             let kept = self.texts.iter().enumerate().filter(|(i, _)| *i != out);
             kept.map(|(_, t)| t.whole(machine)).collect()
         };
+        let without = |out: usize, judged: Vec<Judged>| Fold { train: others(out), judged };
+        let here = |train: Vec<Recording>, test: Vec<Recording>| Fold {
+            train,
+            judged: vec![Judged { setup: Vec::new(), test }],
+        };
+        let texts = self.texts.iter().enumerate();
         match self.split {
-            Split::Place => (self.texts.iter().enumerate())
-                .map(|(out, text)| Fold {
-                    train: others(out),
+            Split::Place => {
+                let placed = |text: &Text| Judged {
                     setup: vec![text.whole(machine)],
                     test: vec![text.whole(machine)],
-                })
-                .collect(),
-            Split::TrialHalves => (self.texts.iter().enumerate())
-                .flat_map(|(out, text)| [(out, text, 0), (out, text, 1)])
-                .map(|(out, text, half)| Fold {
-                    train: others(out),
+                };
+                texts.map(|(out, text)| without(out, vec![placed(text)])).collect()
+            }
+            Split::TrialHalves => {
+                let half = |text: &Text, half: usize| Judged {
                     setup: vec![text.part(machine, |i, _| i % 2 == half)],
                     test: vec![text.part(machine, |i, _| i % 2 != half)],
-                })
-                .collect(),
+                };
+                texts.map(|(out, text)| without(out, vec![half(text, 0), half(text, 1)])).collect()
+            }
             Split::Rows(n) => (0..n)
-                .map(|fold| Fold {
-                    train: parts(&|i, _, _| i % n != fold),
-                    setup: Vec::new(),
-                    test: parts(&|i, _, _| i % n == fold),
-                })
+                .map(|fold| here(parts(&|i, _, _| i % n != fold), parts(&|i, _, _| i % n == fold)))
                 .collect(),
             Split::Pose => {
                 let mut poses: Vec<&str> =
                     self.texts.iter().flat_map(|t| t.rows.iter().map(|row| t.pose(row))).collect();
                 poses.sort_unstable();
                 poses.dedup();
-                let fold = |pose: &&str| Fold {
-                    train: parts(&|_, t, row| t.pose(row) != *pose),
-                    setup: Vec::new(),
-                    test: parts(&|_, t, row| t.pose(row) == *pose),
+                let fold = |pose: &&str| {
+                    here(parts(&|_, t, row| t.pose(row) != *pose), parts(&|_, t, row| t.pose(row) == *pose))
                 };
                 poses.iter().map(fold).collect()
             }

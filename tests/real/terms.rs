@@ -12,7 +12,7 @@ use kincal::recording::Recording;
 use kincal::variation::{Part, Term, Varying};
 use rayon::prelude::*;
 
-use super::sets::{Fold, Set};
+use super::sets::{Fold, Judged, Set};
 
 /// Coefficients may be this many usual sizes large.
 const ROOM: f64 = 30.0;
@@ -130,14 +130,17 @@ pub fn figures(set: &Set, varying: &Varying, names: &[String]) -> Figures {
     };
     let without = || -> Vec<(f64, u64)> {
         let one = |fold: Fold| {
-            let (mut learnt, _) = calibrated(&fold.train);
-            if !fold.setup.is_empty() {
-                learnt = fit_setup(&learnt, &fold.setup, CalibrateOptions::default().loss)
-                    .unwrap_or_else(|e| panic!("{e}"));
-            }
-            squares(&learnt, &fold.test)
+            let (learnt, _) = calibrated(&fold.train);
+            let judged = |Judged { setup, test }: &Judged| {
+                if setup.is_empty() {
+                    return squares(&learnt, test);
+                }
+                let placed = fit_setup(&learnt, setup, CalibrateOptions::default().loss);
+                squares(&placed.unwrap_or_else(|e| panic!("{e}")), test)
+            };
+            fold.judged.iter().map(judged).collect::<Vec<_>>()
         };
-        set.folds().into_par_iter().map(one).collect()
+        set.folds().into_par_iter().flat_map_iter(one).collect()
     };
     let (((sum, count), fit), folds) = rayon::join(whole, without);
     for (name, c) in names.iter().zip(&fit.coefficients) {

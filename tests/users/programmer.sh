@@ -22,7 +22,7 @@ kincal = { path = "$project", default-features = false }
 opt-level = 1
 debug = false
 debug-assertions = false
-overflow-checks = true
+overflow-checks = false
 incremental = false
 lto = "off"
 
