@@ -49,8 +49,9 @@ pub(super) const VISIBLE: f64 = 0.02;
 pub(super) const MANY: usize = 500;
 /// So many spaces are kept.
 const GROUNDS: usize = 12;
-/// More effects are not looked for: among settled positions many joints give way at once; what takes more names in a motion has none.
-const MOST: usize = 8;
+/// More effects are not looked for: among settled positions many joints give way at once, and where fewer are looked for the weakest one has no
+/// place beside what is new; what takes more names in a motion has none.
+const MOST: usize = 10;
 const MOST_IN_MOTION: usize = 5;
 /// Logarithm of the odds at which an effect is taken in.
 pub(super) const ENTER: f64 = 8.0;
